@@ -1,13 +1,13 @@
 """The compose files are valid and run the nodes that there are, each once."""
 
 import argparse
-import ast
 import os
 import re
 import shlex
 import shutil
 import subprocess
 import sys
+from configparser import ConfigParser
 from pathlib import Path
 
 import pytest
@@ -27,9 +27,10 @@ PAGE = 'web_console'
 
 
 def _entry_points_of_nodes() -> set[str]:
-    setup = ast.parse((ROOT / 'ros_ws/src/endoscope_nodes/setup.py').read_text())
-    strings = [str(node.value) for node in ast.walk(setup) if isinstance(node, ast.Constant)]
-    return {text.split(' = ')[0] for text in strings if re.fullmatch(r'\w+ = [\w.]+:\w+', text)}
+    settings = ConfigParser(interpolation=None)
+    settings.read(ROOT / 'ros_ws/src/endoscope_nodes/setup.cfg', encoding='utf-8')
+    scripts = settings['options.entry_points']['console_scripts']
+    return {line.split(' = ')[0] for line in scripts.split('\n') if line}
 
 
 def _compose_command() -> list[str]:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tomllib
 import xml.etree.ElementTree as ElementTree
+from configparser import ConfigParser
 from pathlib import Path
 
 import pytest
@@ -63,11 +64,16 @@ def _locked_modules() -> set[str]:
     return {IMPORT_NAMES.get(name, name) for name in names}
 
 
+def _settings(package: Path) -> ConfigParser:
+    settings = ConfigParser(interpolation=None)
+    settings.read(package / 'setup.cfg', encoding='utf-8')
+    return settings
+
+
 def _entry_points(package: str) -> dict[str, str]:
-    setup = ast.parse((WORKSPACE / 'src' / package / 'setup.py').read_text())
-    strings = [node.value for node in ast.walk(setup) if isinstance(node, ast.Constant)]
-    scripts = [re.fullmatch(r'(\w+) = ([\w.]+:\w+)', str(text)) for text in strings]
-    return {match.group(1): match.group(2) for match in scripts if match}
+    settings = _settings(WORKSPACE / 'src' / package)
+    scripts = settings.get('options.entry_points', 'console_scripts', fallback='')
+    return dict(line.split(' = ') for line in scripts.split('\n') if line)
 
 
 def test_the_top_level_is_what_it_is_meant_to_be() -> None:
@@ -128,7 +134,9 @@ def test_everything_in_the_package_is_installed(package: Path, tmp_path: Path) -
         for path in (package / package.name).rglob('*')
         if path.is_file() and not NOT_SOURCE & set(path.parts)
     }
-    assert built == sources, 'a folder without __init__.py, or a suffix that setup.py does not ship'
+    assert built == sources, (
+        'a folder without __init__.py, or a suffix that setup.cfg does not ship'
+    )
 
 
 @each_package
@@ -169,13 +177,12 @@ def test_the_citation_has_what_cff_asks_for() -> None:
 @each_package
 def test_manifests_agree(package: Path) -> None:
     manifest = ElementTree.parse(package / 'package.xml').getroot()
-    setup = (package / 'setup.py').read_text()
+    settings = _settings(package)
     assert manifest.findtext('name') == package.name
-    assert f"package_name = '{package.name}'" in setup
-    assert f"version='{manifest.findtext('version')}'" in setup
-    assert f"license='{manifest.findtext('license')}'" in setup
+    for key in ('name', 'version', 'license', 'description'):
+        assert settings['metadata'][key] == manifest.findtext(key)
     assert (package / 'resource' / package.name).exists()
-    assert f'install_scripts=$base/lib/{package.name}' in (package / 'setup.cfg').read_text()
+    assert settings['install']['install_scripts'] == f'$base/lib/{package.name}'
 
 
 @each_package

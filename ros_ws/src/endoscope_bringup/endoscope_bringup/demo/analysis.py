@@ -17,14 +17,7 @@ from endoscope_core.signals import (
     calibration_sinusoid,
     motion_by_name,
 )
-from endoscope_nodes.names import (
-    JOINTS,
-    MOTOR_MEASURED,
-    MOTORS,
-    SLAVE_COMMAND,
-    SLAVE_MEASURED,
-    WIRES_MEASURED,
-)
+from endoscope_nodes import names
 
 Array = NDArray[np.float64]
 
@@ -78,8 +71,8 @@ class Angles:
     @classmethod
     def of(cls, recording: Recording) -> 'Angles':
         """Those of a recording."""
-        actual = recording.joint_state(SLAVE_MEASURED).select(JOINTS)
-        asked = recording.joint_state(SLAVE_COMMAND).select(JOINTS)
+        actual = recording.joint_state(names.SLAVE_MEASURED).select(names.JOINTS)
+        asked = recording.joint_state(names.SLAVE_COMMAND).select(names.JOINTS)
         return cls(
             actual.seconds(0),
             actual.require('position'),
@@ -108,7 +101,7 @@ class Angles:
 def run_of(angles: Angles, shafts: tuple[Array, Array], segment: Segment) -> TrackingRun:
     """The steady part of a run, beside what was asked for; `shafts` are (K,) s and (K, J) rad."""
     own = angles.between(segment.start, segment.end)
-    signal = motion_by_name(segment.motion).joints[JOINTS[0]]
+    signal = motion_by_name(segment.motion).joints[names.JOINTS[0]]
     began = start_of_motion(own.asked_time, own.asked[:, 0], signal)
     if own.asked_time[-1] < began + signal.steady[1]:
         raise ValueError(
@@ -181,7 +174,7 @@ def longest_crossing(time: Array, shafts: Array, start: float, end: float) -> Cr
 
 
 def _shafts(recording: Recording) -> tuple[Array, Array]:
-    series = recording.joint_state(MOTOR_MEASURED).select(MOTORS)
+    series = recording.joint_state(names.MOTOR_MEASURED).select(names.MOTORS)
     return series.seconds(0), series.require('position')
 
 
@@ -194,7 +187,7 @@ def _noise(angles: dict[str, Angles], segments: Sequence[Segment]) -> float:
 def _calibration(
     recording: Recording, angles: Angles, facts: CalibrationFacts
 ) -> CalibrationOutcome:
-    wires = recording.joint_state(WIRES_MEASURED)
+    wires = recording.joint_state(names.WIRES_MEASURED)
     wire_time = wires.seconds(0) - facts.start
     recorded = (wire_time >= 0) & (wire_time < CALIBRATION_RECORD_DURATION)
     own = angles.between(facts.start, facts.start + CALIBRATION_RECORD_DURATION)
@@ -207,6 +200,6 @@ def _calibration(
         wires.require('effort')[recorded],
         wires.names,
         own.time[steady],
-        np.column_stack([desired] * len(JOINTS)),
+        np.column_stack([desired] * len(names.JOINTS)),
         np.degrees(own.actual[steady]),
     )

@@ -13,21 +13,15 @@ from typing import Any
 
 from endoscope_bringup.operating.status import calibration_in_words, status_of
 from endoscope_bringup.progress_line import ShareBar
+from endoscope_nodes import names
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import GraphRefusedError
 from endoscope_nodes.client.graph_parameters import read_parameter, read_parameters, set_parameters
-from endoscope_nodes.names import (
-    LOAD_CELLS_TARE,
-    MOTOR_REBOOT,
-    RECORDER_START,
-    RECORDER_STOP,
-    REGISTER_STRAIGHT,
-)
 
 _OF_A_DEVICE = {
-    'tare': LOAD_CELLS_TARE,
-    'register_straight': REGISTER_STRAIGHT,
-    'reboot': MOTOR_REBOOT,
+    'tare': names.LOAD_CELLS_TARE,
+    'register_straight': names.REGISTER_STRAIGHT,
+    'reboot': names.MOTOR_REBOOT,
 }
 
 _NEXT_WORD_S = 1.5
@@ -51,7 +45,7 @@ def act(client: GraphClient, args: argparse.Namespace) -> Reply:
     if action == 'set':
         return _set(client, args.parameter, args.value, patience_s)
     if action == 'record':
-        service = RECORDER_START if args.what == 'start' else RECORDER_STOP
+        service = names.RECORDER_START if args.what == 'start' else names.RECORDER_STOP
         client.find(patience_s)
         said = client.trigger(service, patience_s)
         return Reply((f'recording to {said}' if args.what == 'start' else said,))

@@ -11,6 +11,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from endoscope_core.safety.operating_state import CAUSES_PRESENT
+from endoscope_nodes import names
 from endoscope_nodes.client.graph_listener import (
     PATIENCE_S,
     SUPERVISOR,
@@ -20,14 +21,6 @@ from endoscope_nodes.client.graph_listener import (
     NoGraphError,
 )
 from endoscope_nodes.client.order_feedback import CALIBRATE, HOME, OrderFeedback, OrderState
-from endoscope_nodes.names import (
-    CALIBRATION_RESULT,
-    CALIBRATION_RUN,
-    REFUSAL,
-    REFUSAL_CODE,
-    REFUSED_NS,
-    STATE_COMMAND,
-)
 from endoscope_nodes.runtime.qos import EVENT
 
 WHOLE_S = 10.0
@@ -55,7 +48,7 @@ class GraphClient(GraphListener):
         super().__init__(node, serve, clock)
         # Called with what is waited for, in words, before an order can be given.
         self.told: Callable[[str], object] = lambda what: None
-        self._orders = node.create_publisher(String, STATE_COMMAND, EVENT)
+        self._orders = node.create_publisher(String, names.STATE_COMMAND, EVENT)
         self._clients: dict[str, Client] = {}
 
     def is_connected(self) -> bool:
@@ -130,9 +123,9 @@ class GraphClient(GraphListener):
 
         def is_refused() -> bool:
             said = self.health.get(SUPERVISOR)
-            if said is None or said.received_ns <= asked_ns or not said.values[REFUSAL]:
+            if said is None or said.received_ns <= asked_ns or not said.values[names.REFUSAL]:
                 return False
-            return int(said.values[REFUSED_NS]) >= graph_ns
+            return int(said.values[names.REFUSED_NS]) >= graph_ns
 
         while self._clock() <= end:
             if withdrawn():
@@ -145,9 +138,11 @@ class GraphClient(GraphListener):
                 if not is_refused():
                     return None
                 said = self.health[SUPERVISOR].values
-                if said[REFUSAL_CODE] == CAUSES_PRESENT and self._becomes_whole(said[REFUSAL]):
+                if said[names.REFUSAL_CODE] == CAUSES_PRESENT and self._becomes_whole(
+                    said[names.REFUSAL]
+                ):
                     return self._ask(command, done, what, patience_s, withdrawn)
-                raise GraphRefusedError(said[REFUSAL])
+                raise GraphRefusedError(said[names.REFUSAL])
         raise GraphRefusedError(f'timed out after {patience_s:g} s waiting for {what}')
 
     def _becomes_whole(self, refused: str) -> bool:
@@ -211,11 +206,11 @@ class GraphClient(GraphListener):
         """Calibrate, and wait for the result; calibration may say nothing for `patience_s`."""
         known = self.known_orders(patience_s)
         try:
-            self.trigger(CALIBRATION_RUN, patience_s)
+            self.trigger(names.CALIBRATION_RUN, patience_s)
         except GraphRefusedError as error:
             if not self._becomes_whole(str(error)):
                 raise
-            self.trigger(CALIBRATION_RUN, patience_s)
+            self.trigger(names.CALIBRATION_RUN, patience_s)
         ended = self._followed(known, CALIBRATE, patience_s, progress)
         if ended.state != OrderState.SUCCEEDED:
             raise GraphRefusedError(ended.words)
@@ -223,7 +218,7 @@ class GraphClient(GraphListener):
         def is_told() -> bool:
             return self.calibration is not None and self.calibration.stamp_ns > ended.id
 
-        self.wait_for(is_told, CALIBRATION_RESULT, patience_s)
+        self.wait_for(is_told, names.CALIBRATION_RESULT, patience_s)
         return cast(Health, self.calibration)
 
     def trigger(self, service: str, patience_s: float = PATIENCE_S) -> str:

@@ -14,17 +14,8 @@ from std_msgs.msg import Header, String
 
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.exit_status import ClosedOnExit
+from endoscope_nodes import names
 from endoscope_nodes.client.order_feedback import OrderFeedback, OrderState
-from endoscope_nodes.names import (
-    AWAITED,
-    CALIBRATION_FEEDBACK,
-    CALIBRATION_RESULT,
-    COMPENSATOR_STATE,
-    DIAGNOSTICS,
-    FACTOR,
-    MOTION_SESSION,
-    OPERATING_STATE,
-)
 from endoscope_nodes.runtime.qos import profile
 from endoscope_nodes.runtime.streams import RawSubscription
 from endoscope_nodes.topics import Qos
@@ -91,12 +82,12 @@ class GraphListener(ClosedOnExit):
         self.orders: dict[int, OrderFeedback] = {}
         self._prefix = f'{node.get_namespace().rstrip("/")}/'
         self._heard: list[tuple[RawSubscription, Callable[[bytes, int], object]]] = []
-        self.listen(String, OPERATING_STATE, self._on_state, latched=True)
-        self.listen(Header, MOTION_SESSION, self._on_session)
-        self.listen(DiagnosticArray, DIAGNOSTICS, self._on_health)
-        self.listen(DiagnosticArray, CALIBRATION_FEEDBACK, self._on_feedback, latched=True)
-        self.listen(DiagnosticArray, CALIBRATION_RESULT, self._on_result, latched=True)
-        self.listen(DiagnosticArray, COMPENSATOR_STATE, self._on_model, latched=True)
+        self.listen(String, names.OPERATING_STATE, self._on_state, latched=True)
+        self.listen(Header, names.MOTION_SESSION, self._on_session)
+        self.listen(DiagnosticArray, names.DIAGNOSTICS, self._on_health)
+        self.listen(DiagnosticArray, names.CALIBRATION_FEEDBACK, self._on_feedback, latched=True)
+        self.listen(DiagnosticArray, names.CALIBRATION_RESULT, self._on_result, latched=True)
+        self.listen(DiagnosticArray, names.COMPENSATOR_STATE, self._on_model, latched=True)
 
     def listen(
         self,
@@ -167,13 +158,13 @@ class GraphListener(ClosedOnExit):
     def awaited(self) -> str:
         """What the supervisor has never heard and has to hear; empty where the graph is whole."""
         said = self.health.get(SUPERVISOR)
-        return '' if said is None else said.values[AWAITED]
+        return '' if said is None else said.values[names.AWAITED]
 
     @property
     def factor(self) -> float | None:
         """Simulated seconds in a real one, as last told; None where time is real, or before."""
         said = self.health.get(LOCK_STEP)
-        factor = math.nan if said is None else float(said.values[FACTOR])
+        factor = math.nan if said is None else float(said.values[names.FACTOR])
         return factor if math.isfinite(factor) else None
 
     @property

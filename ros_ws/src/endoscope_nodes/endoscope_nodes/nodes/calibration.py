@@ -30,6 +30,7 @@ from endoscope_core.identification.plant_fit import PlantFitError, plants_of_cal
 from endoscope_core.safety import StateCommand, TensionGuard
 from endoscope_core.safety.guards import TOLD_RAD
 from endoscope_core.signals import SINUSOID, calibration_motion
+from endoscope_nodes import names
 from endoscope_nodes.client.calibration_result import (
     aborted_result,
     numbers_of,
@@ -43,20 +44,6 @@ from endoscope_nodes.client.order_feedback import (
     OrderCode,
     OrderFeedback,
     OrderState,
-)
-from endoscope_nodes.names import (
-    CALIBRATION_COMMAND,
-    CALIBRATION_FEEDBACK,
-    CALIBRATION_NUMBERS,
-    CALIBRATION_RESULT,
-    CALIBRATION_RUN,
-    JOINTS,
-    MOTOR_MEASURED,
-    MOTORS,
-    SLAVE_MEASURED,
-    STATE_COMMAND,
-    WIRES,
-    WIRES_MEASURED,
 )
 from endoscope_nodes.runtime.diagnostics import OK, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
@@ -94,9 +81,9 @@ class CalibrationNode(EndoscopeNode):
         self._run: CalibrationRun | None = None
         self._homing = False
         self._began_ns = 0
-        self._bending = BendingRecord(len(JOINTS))
+        self._bending = BendingRecord(len(names.JOINTS))
         self._judging: Future[_Judgement] | None = None
-        self._zeros = np.zeros(len(WIRES))
+        self._zeros = np.zeros(len(names.WIRES))
         self._runs = 0
         self._aborts = 0
         self._refused = 0
@@ -104,20 +91,20 @@ class CalibrationNode(EndoscopeNode):
         self._order = OrderFeedback()
         self._newest = 0
         self._fed_ns = 0
-        self._guard = TensionGuard(WIRES, self.rig.tension.calibration_ceiling)
+        self._guard = TensionGuard(names.WIRES, self.rig.tension.calibration_ceiling)
         self._commands = JointPublisher(
-            self, CALIBRATION_COMMAND, JOINTS, ('position', 'velocity'), COMMAND
+            self, names.CALIBRATION_COMMAND, names.JOINTS, ('position', 'velocity'), COMMAND
         )
-        self._results = self.create_publisher(DiagnosticArray, CALIBRATION_RESULT, RESULT)
-        self._numbers = self.create_publisher(JointState, CALIBRATION_NUMBERS, RESULT)
-        self._feedback = self.create_publisher(DiagnosticArray, CALIBRATION_FEEDBACK, RESULT)
+        self._results = self.create_publisher(DiagnosticArray, names.CALIBRATION_RESULT, RESULT)
+        self._numbers = self.create_publisher(JointState, names.CALIBRATION_NUMBERS, RESULT)
+        self._feedback = self.create_publisher(DiagnosticArray, names.CALIBRATION_FEEDBACK, RESULT)
         self._session = SessionWatch(self, None, self._on_leave)
         self._pose = context.pose_of(self)
-        self._wires = StreamWatch(self.ticker, WIRES_MEASURED)
-        JointSubscription(self, WIRES_MEASURED, WIRES, self._on_wires, SENSOR_ASKED)
-        JointSubscription(self, SLAVE_MEASURED, JOINTS, self._on_bending, SENSOR_ASKED)
-        self.create_subscription(String, STATE_COMMAND, self._on_state_command, EVENT)
-        self.serve(CALIBRATION_RUN, self._calibrate)
+        self._wires = StreamWatch(self.ticker, names.WIRES_MEASURED)
+        JointSubscription(self, names.WIRES_MEASURED, names.WIRES, self._on_wires, SENSOR_ASKED)
+        JointSubscription(self, names.SLAVE_MEASURED, names.JOINTS, self._on_bending, SENSOR_ASKED)
+        self.create_subscription(String, names.STATE_COMMAND, self._on_state_command, EVENT)
+        self.serve(names.CALIBRATION_RUN, self._calibrate)
         self.diagnostics.add('procedure', self._report)
         self.ticker.add(self._on_tick)
 
@@ -136,12 +123,12 @@ class CalibrationNode(EndoscopeNode):
         # The first judgement sets up memory, which takes longer than a tick. What it says of no
         # tension at all does not matter.
         with contextlib.suppress(UnseenTensionError):
-            classifier.classify(np.zeros((self._motion.samples, len(WIRES))))
+            classifier.classify(np.zeros((self._motion.samples, len(names.WIRES))))
         return classifier
 
     def _calibrate(self) -> tuple[bool, str]:
         refusal = self._start(homing=False)
-        return not refusal, refusal or f'begun; {CALIBRATION_FEEDBACK} says how it fares'
+        return not refusal, refusal or f'begun; {names.CALIBRATION_FEEDBACK} says how it fares'
 
     def _on_state_command(self, message: String) -> None:
         if message.data == StateCommand.HOME:
@@ -191,7 +178,7 @@ class CalibrationNode(EndoscopeNode):
         self._commands.session = self._session.name
         self._run = CalibrationRun(
             [x / self.rig.joints.gear for x in shafts],
-            len(WIRES),
+            len(names.WIRES),
             TICK_NS,
             self._settings.return_speed,
             self._settings.rest,
@@ -199,7 +186,7 @@ class CalibrationNode(EndoscopeNode):
             self._motion,
         )
         self._homing = homing
-        self._bending = BendingRecord(len(JOINTS))
+        self._bending = BendingRecord(len(names.JOINTS))
         self._judging = None
         self._feed(state=OrderState.EXECUTING, words=str(self._run.step))
         self.diagnostics.publish()
@@ -220,14 +207,14 @@ class CalibrationNode(EndoscopeNode):
         if self._guard.trouble:
             return self._guard.trouble
         if self._pose.shafts() is None:
-            return f'{MOTOR_MEASURED} is silent or not finite'
+            return f'{names.MOTOR_MEASURED} is silent or not finite'
         return self._wires.trouble(self._timeout_ns)
 
     def _on_leave(self) -> None:
         self._abort('the motion session has ended', OrderCode.SESSION_ENDED)
 
     def _on_wires(self, sample: JointSample) -> None:
-        if len(sample.effort) != len(WIRES):
+        if len(sample.effort) != len(names.WIRES):
             return
         self._wires.note()
         self._guard.update(sample.effort)
@@ -235,7 +222,7 @@ class CalibrationNode(EndoscopeNode):
             self._run.add_tension(sample.stamp_ns, sample.effort)
 
     def _on_bending(self, sample: JointSample) -> None:
-        if self._run is not None and len(sample.position) == len(JOINTS):
+        if self._run is not None and len(sample.position) == len(names.JOINTS):
             self._bending.add(sample.stamp_ns, sample.position)
 
     def _on_tick(self, stamp_ns: int, periods: int) -> None:
@@ -318,7 +305,7 @@ class CalibrationNode(EndoscopeNode):
     def _finish_homing(self) -> None:
         """Say that the slave is home where its shafts are, and only there."""
         shafts = self._pose.shafts() or ()
-        away = {name: x for name, x in zip(MOTORS, shafts, strict=False) if abs(x) > TOLD_RAD}
+        away = {name: x for name, x in zip(names.MOTORS, shafts, strict=False) if abs(x) > TOLD_RAD}
         self._run = None
         if shafts and not away:
             self._tell('home reached')

@@ -25,17 +25,8 @@ from endoscope_core.safety import (
     Refusal,
     StandingStill,
 )
+from endoscope_nodes import names
 from endoscope_nodes.client.calibration_result import findings_of, is_of_no_class
-from endoscope_nodes.names import (
-    CALIBRATION_COMMAND,
-    CALIBRATION_RESULT,
-    COMPENSATOR_STATE,
-    CORRECTION,
-    JOINTS,
-    MOTOR_COMMAND,
-    MOTORS,
-    SLAVE_COMMAND,
-)
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report, diagnostic_array, status
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
@@ -50,8 +41,8 @@ CONSOLE = 'console'
 CALIBRATION = 'calibration'
 NOBODY = 'nobody'
 
-_AT_ZERO = (0.0,) * len(JOINTS)
-_NOTHING = np.zeros(len(JOINTS))
+_AT_ZERO = (0.0,) * len(names.JOINTS)
+_NOTHING = np.zeros(len(names.JOINTS))
 _ANY_CLASS = CalibrationFindings(class_deg=70)
 
 
@@ -88,18 +79,18 @@ class CompensatorNode(EndoscopeNode):
             CommandLimits(facts.correction, motors.speed / facts.gear, facts.correction, timeout_ns)
         )
         limits = (facts.drive * facts.gear, motors.speed, motors.acceleration, motors.step)
-        self.shaper = MotionShaper(MotionLimits.either_way(len(MOTORS), *limits))
+        self.shaper = MotionShaper(MotionLimits.either_way(len(names.MOTORS), *limits))
         self._feedforward = Feedforward(
-            len(JOINTS),
+            len(names.JOINTS),
             FeedforwardSettings(
                 lead=p.lead,
                 speed_limit=motors.speed / facts.gear,
                 limits=MotorLimits.of(self.rig),
             ),
         )
-        self._passing = Feedforward(len(JOINTS))
-        self._desired = DesiredMotion(len(JOINTS))
-        self._choice = LawChoice(len(JOINTS), p.parameter_sets, p.table)
+        self._passing = Feedforward(len(names.JOINTS))
+        self._desired = DesiredMotion(len(names.JOINTS))
+        self._choice = LawChoice(len(names.JOINTS), p.parameter_sets, p.table)
         self._trouble = self._load()
         self.findings: CalibrationFindings | None = None
         self._found: CalibrationFindings | None = None
@@ -109,26 +100,28 @@ class CompensatorNode(EndoscopeNode):
         self._source = NOBODY
         self._last_stamp_ns = 0
         self._sent = _AT_ZERO
-        self._answer = StandingStill(MOTORS, self.rig.motors.resolution)
+        self._answer = StandingStill(names.MOTORS, self.rig.motors.resolution)
         self._corrections: tuple[JointSample | None, JointSample | None] = (None, None)
         self._corrected = False
         self._beyond_reach = self._beyond_before = 0
         self._state_is_news = True
-        self._motors = JointPublisher(self, MOTOR_COMMAND, MOTORS, ('position',), COMMAND)
-        self._states = self.create_publisher(DiagnosticArray, COMPENSATOR_STATE, RESULT)
+        self._motors = JointPublisher(
+            self, names.MOTOR_COMMAND, names.MOTORS, ('position',), COMMAND
+        )
+        self._states = self.create_publisher(DiagnosticArray, names.COMPENSATOR_STATE, RESULT)
         self._session = SessionWatch(self, self._restart, self._restart)
         self._clutch = ClutchWatch(self, self._session, self._end_stream)
         self._pose = context.pose_of(self)
         for topic, gate, take in (
-            (CALIBRATION_COMMAND, self.calibration_gate, self._on_calibration),
-            (SLAVE_COMMAND, self.gate, self._on_console),
-            (CORRECTION, self.correction_gate, self._on_correction),
+            (names.CALIBRATION_COMMAND, self.calibration_gate, self._on_calibration),
+            (names.SLAVE_COMMAND, self.gate, self._on_console),
+            (names.CORRECTION, self.correction_gate, self._on_correction),
         ):
             CommandInput(self, self._session, topic, gate, take)
             if gate is not self.correction_gate:
                 self._session.obeys(topic, gate)
         results = self.create_subscription(
-            DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT
+            DiagnosticArray, names.CALIBRATION_RESULT, self._on_result, RESULT
         )
         self._results = self._session.senders_of(results, self._doubt_results)
         self.diagnostics.add('commands', CommandReport(self.gate, self.ticker, self._session.leave))
@@ -153,7 +146,7 @@ class CompensatorNode(EndoscopeNode):
             self._doubt_results(crowd)
         if crowd or not self._calibrated_in or message.header.frame_id != self._calibrated_in:
             why = crowd or f'it is of {message.header.frame_id or "no session"}'
-            self.get_logger().warning(f'{CALIBRATION_RESULT} is not taken: {why}')
+            self.get_logger().warning(f'{names.CALIBRATION_RESULT} is not taken: {why}')
             return
         self._found, self._news = found, True
 
@@ -173,7 +166,7 @@ class CompensatorNode(EndoscopeNode):
         """Load and compile what the first command would wait for; why a mode is not available."""
         trouble = ''
         for mode in dict.fromkeys((*MODES, self._settings.mode)):
-            trial = Feedforward(len(JOINTS))
+            trial = Feedforward(len(names.JOINTS))
             try:
                 trial.select(self._choice.law(mode, BY_CLASS, _ANY_CLASS))
             except EndoscopeError as error:
@@ -216,7 +209,7 @@ class CompensatorNode(EndoscopeNode):
             self._source = NOBODY
             if self._clutch.held:
                 said = f' ({self.gate.last_reason})' if self.gate.last_reason else ''
-                self._session.leave(f'{SLAVE_COMMAND} ended while the clutch was held{said}')
+                self._session.leave(f'{names.SLAVE_COMMAND} ended while the clutch was held{said}')
         elif self._source == CALIBRATION and not self.calibration_gate.is_fresh(now):
             self._source = NOBODY
         if self._source == NOBODY:
@@ -350,7 +343,7 @@ class CompensatorNode(EndoscopeNode):
         }
         if self.findings is not None and self.findings.class_deg is not None:
             values['class_deg'] = self.findings.class_deg
-        for joint, parameters in zip(JOINTS, law.parameters, strict=False):
+        for joint, parameters in zip(names.JOINTS, law.parameters, strict=False):
             values |= {f'{joint}.{key}': value for key, value in parameters.to_dict().items()}
         said = status('compensator: model', OK, self._model_in_words(), values)
         self._states.publish(diagnostic_array(now, said))
@@ -375,7 +368,7 @@ class CompensatorNode(EndoscopeNode):
         self._beyond_before = self._beyond_reach
         if beyond and self.findings is not None:
             level = max(level, WARN)
-            said += f'; {reach_in_words(self.findings.reaches, JOINTS)}, more was asked for'
+            said += f'; {reach_in_words(self.findings.reaches, names.JOINTS)}, more was asked for'
         return (
             level,
             said,

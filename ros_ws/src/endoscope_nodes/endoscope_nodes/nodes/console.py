@@ -20,17 +20,9 @@ from endoscope_core.control import (
 from endoscope_core.safety import MotionLimits, MotionShaper
 from endoscope_core.safety.motion_session import STALL_NS
 from endoscope_core.signals.command_file import CommandFileError
+from endoscope_nodes import names
 from endoscope_nodes.client.calibration_result import findings_of, is_of_no_class
 from endoscope_nodes.client.handle_sender import CLUTCH_PERIOD_NS, clutch_message
-from endoscope_nodes.names import (
-    CALIBRATION_COMMAND,
-    CALIBRATION_RESULT,
-    FINISHED,
-    JOINTS,
-    MASTER_CLUTCH,
-    MASTER_MEASURED,
-    SLAVE_COMMAND,
-)
 from endoscope_nodes.nodes.console_motion import (
     SampledMotion,
     approach,
@@ -86,7 +78,7 @@ class ConsoleNode(EndoscopeNode):
         facts = self.rig.joints
         limits, hand_limits = (
             MotionLimits.either_way(
-                len(JOINTS), facts.reach, speed, facts.acceleration, facts.entry_step
+                len(names.JOINTS), facts.reach, speed, facts.acceleration, facts.entry_step
             )
             for speed in (facts.speed, facts.hand_speed)
         )
@@ -103,11 +95,11 @@ class ConsoleNode(EndoscopeNode):
         self._clutch_out: Publisher | None = None
         self._session = SessionWatch(self, self._rest, self._rest)
         self._pose = context.pose_of(self)
-        self._calibration = StreamWatch.of(self, CALIBRATION_COMMAND, COMMAND)
+        self._calibration = StreamWatch.of(self, names.CALIBRATION_COMMAND, COMMAND)
         handle = JointSubscription(
             self,
-            MASTER_MEASURED,
-            JOINTS,
+            names.MASTER_MEASURED,
+            names.JOINTS,
             self._on_handle,
             SENSOR_ASKED,
             on_malformed=lambda reason: self._handle.refuse(HandleRefusal.MALFORMED, reason),
@@ -115,7 +107,7 @@ class ConsoleNode(EndoscopeNode):
         self._handle_senders = self._session.senders_of(handle.subscription)
         self._clutch = ClutchWatch(self, self._session)
         results = self.create_subscription(
-            DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT
+            DiagnosticArray, names.CALIBRATION_RESULT, self._on_result, RESULT
         )
         self._results = self._session.senders_of(results)
         self._on_parameters(self._settings)
@@ -149,7 +141,7 @@ class ConsoleNode(EndoscopeNode):
         """Be a sender only of what the source asks for: another one may be the sender then."""
         if self._commands is None and self._settings.source != 'none':
             self._commands = JointPublisher(
-                self, SLAVE_COMMAND, JOINTS, ('position', 'velocity'), COMMAND
+                self, names.SLAVE_COMMAND, names.JOINTS, ('position', 'velocity'), COMMAND
             )
             self._commands.session = self._session.name
         elif self._commands is not None and self._settings.source == 'none':
@@ -157,7 +149,7 @@ class ConsoleNode(EndoscopeNode):
             self._commands = None
         speaks = self._played is not None and not self._settings.hold_to_play
         if self._clutch_out is None and speaks:
-            self._clutch_out = self.create_publisher(Joy, MASTER_CLUTCH, EVENT)
+            self._clutch_out = self.create_publisher(Joy, names.MASTER_CLUTCH, EVENT)
         elif self._clutch_out is not None and not speaks:
             self.destroy_publisher(self._clutch_out)
             self._clutch_out = None
@@ -187,7 +179,7 @@ class ConsoleNode(EndoscopeNode):
         held = (
             self._clutch.held
             and self._handle.alive(self.ticker.monotonic_ns())
-            and not self.count_publishers(SLAVE_COMMAND)
+            and not self.count_publishers(names.SLAVE_COMMAND)
         )
         source = self._settings.source
         if source == FOLLOW_THE_HANDLE or not (moves or held):
@@ -308,11 +300,11 @@ class ConsoleNode(EndoscopeNode):
             self._handle.scale = self._settings.scale
             self._handle.engage(pose)
             self._hand_shaper.restart(pose)
-            followed = pose, (0.0,) * len(JOINTS)
+            followed = pose, (0.0,) * len(names.JOINTS)
         if not self._moving:
             return
         # While the handle is silent and the clutch still held, the slave is told to stay.
-        target, velocity = followed or (self._hand_shaper.position, (0.0,) * len(JOINTS))
+        target, velocity = followed or (self._hand_shaper.position, (0.0,) * len(names.JOINTS))
         self._publish(commands, self._hand_shaper, target, velocity, stamp_ns, periods)
 
     def _publish(
@@ -339,13 +331,15 @@ class ConsoleNode(EndoscopeNode):
             'clutch held': self._clutch.held,
             'following': handle.engaged,
             'lag [s]': handle.lag,
-            FINISHED: self.finished,
+            names.FINISHED: self.finished,
         }
         values |= {f'handle refused: {reason}': n for reason, n in handle.refused.items()}
         refused = sum(handle.refused.values())
         fresh, self._refused_before = refused - self._refused_before, refused
         if fresh:
-            said = f'{fresh} messages of {MASTER_MEASURED} refused, last: {handle.last_reason}'
+            said = (
+                f'{fresh} messages of {names.MASTER_MEASURED} refused, last: {handle.last_reason}'
+            )
             return WARN, said, values
         unheeded = self._unheeded()
         if unheeded and not self._told_of_handle:
@@ -356,13 +350,17 @@ class ConsoleNode(EndoscopeNode):
         beyond = self._beyond_reach - self._beyond_before
         self._beyond_before = self._beyond_reach
         if beyond:
-            return WARN, f'{reach_in_words(self._reaches, JOINTS)}, more was asked for', values
+            return (
+                WARN,
+                f'{reach_in_words(self._reaches, names.JOINTS)}, more was asked for',
+                values,
+            )
         if self._played is not None:
             values['progress [s]'] = min(self._next, len(self._played)) * TICK_S
             values['length [s]'] = len(self._played) * TICK_S
             if self.finished:
-                return OK, FINISHED, values
+                return OK, names.FINISHED, values
             return OK, WAITING if self._waits_for_the_clutch else 'playing', values
         if source == FOLLOW_THE_HANDLE and not handle.alive(self.ticker.monotonic_ns()):
-            return WARN, f'{MASTER_MEASURED} is silent', values
+            return WARN, f'{names.MASTER_MEASURED} is silent', values
         return OK, source, values

@@ -11,15 +11,8 @@ from endoscope_core.control import (
     TrackerMeasurement,
 )
 from endoscope_core.safety import CommandGate, CommandLimits, Refusal
+from endoscope_nodes import names
 from endoscope_nodes.client.calibration_result import findings_of
-from endoscope_nodes.names import (
-    CALIBRATION_COMMAND,
-    CALIBRATION_RESULT,
-    CORRECTION,
-    JOINTS,
-    SLAVE_COMMAND,
-    SLAVE_MEASURED,
-)
 from endoscope_nodes.runtime.diagnostics import OK, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
@@ -36,7 +29,7 @@ LAWS: dict[str, type[Controller]] = {
     RECURSIVE_LEAST_SQUARES: RecursiveHysteresisController,
 }
 
-_NOTHING = np.zeros(len(JOINTS))
+_NOTHING = np.zeros(len(names.JOINTS))
 
 
 class ControllerNode(EndoscopeNode):
@@ -53,30 +46,32 @@ class ControllerNode(EndoscopeNode):
         self._law = p.law
         self.controller = self._new_controller()
         # Loads what is compiled now, which the second step needs: no command must wait for it.
-        trial = AdaptiveBacklashController(len(JOINTS))
+        trial = AdaptiveBacklashController(len(names.JOINTS))
         for time in (0.0, 1e-3):
             trial.step(time, _NOTHING, _NOTHING)
         facts, self._timeout_ns = self.rig.joints, self.rig.timeouts.command_ns
         self._gate = CommandGate(
             CommandLimits(facts.reach, facts.speed, facts.entry_step, self._timeout_ns)
         )
-        self._desired = DesiredMotion(len(JOINTS))
+        self._desired = DesiredMotion(len(names.JOINTS))
         self._used_ns = 0
         self._last_stamp_ns = 0
         self._forget = False
         self._told = 0
-        self._corrections = JointPublisher(self, CORRECTION, JOINTS, ('position',), COMMAND)
+        self._corrections = JointPublisher(
+            self, names.CORRECTION, names.JOINTS, ('position',), COMMAND
+        )
         self._session = SessionWatch(self, self._restart, self._restart)
         self._pose = context.pose_of(self)
-        self._calibration = StreamWatch.of(self, CALIBRATION_COMMAND, COMMAND)
-        CommandInput(self, self._session, SLAVE_COMMAND, self._gate, self._on_command)
-        self.create_subscription(DiagnosticArray, CALIBRATION_RESULT, self._on_result, RESULT)
+        self._calibration = StreamWatch.of(self, names.CALIBRATION_COMMAND, COMMAND)
+        CommandInput(self, self._session, names.SLAVE_COMMAND, self._gate, self._on_command)
+        self.create_subscription(DiagnosticArray, names.CALIBRATION_RESULT, self._on_result, RESULT)
         self.diagnostics.add('commands', CommandReport(self._gate, self.ticker))
         self.diagnostics.add('feedback', self._report)
 
     def _new_controller(self) -> Controller:
         return LAWS[self._law](
-            len(JOINTS),
+            len(names.JOINTS),
             stale_after=self._settings.tracker_timeout,
             fade_time=self._settings.fade_time,
         )
@@ -147,17 +142,17 @@ class ControllerNode(EndoscopeNode):
             'law': self._law,
             'measurements refused': controller.refused,
         }
-        for joint, (gain, backlash) in zip(JOINTS, controller.learnt, strict=True):
+        for joint, (gain, backlash) in zip(names.JOINTS, controller.learnt, strict=True):
             values |= {f'{joint}.gain': gain, f'{joint}.backlash': backlash}
         if not self._settings.active:
             return OK, 'not active', values
         if not self._pose.tracks:
-            return WARN, f'{SLAVE_MEASURED} is silent: feed-forward alone', values
+            return WARN, f'{names.SLAVE_MEASURED} is silent: feed-forward alone', values
         # Measurements are taken with commands: at rest none of them is fresh, however many come.
         idle = self._corrections.count == self._told
         self._told = self._corrections.count
         if idle:
-            return OK, f'waiting for {SLAVE_COMMAND}', values
+            return OK, f'waiting for {names.SLAVE_COMMAND}', values
         if not controller.tracker_fresh(self._last_stamp_ns * 1e-9):
-            return WARN, f'{SLAVE_MEASURED} is not believed: feed-forward alone', values
+            return WARN, f'{names.SLAVE_MEASURED} is not believed: feed-forward alone', values
         return OK, 'in the loop', values

@@ -22,13 +22,7 @@ from endoscope_devices.em_tracker import (
     load_registration,
     save_registration,
 )
-from endoscope_nodes.names import (
-    JOINTS,
-    REGISTER_STRAIGHT,
-    SIMULATED_BENDING,
-    SLAVE_MEASURED,
-    TRACKER_POSE,
-)
+from endoscope_nodes import names
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, STALE, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
@@ -57,8 +51,10 @@ class EmTrackerNode(EndoscopeNode):
         self._registration: StraightRegistration | None = None
         self._pose = PoseStamped()
         self._pose.header.frame_id = self.rig.instrument.base_frame
-        self._poses = self.create_publisher(PoseStamped, TRACKER_POSE, SENSOR_OFFERED)
-        self._measured = JointPublisher(self, SLAVE_MEASURED, JOINTS, ('position',), SENSOR_OFFERED)
+        self._poses = self.create_publisher(PoseStamped, names.TRACKER_POSE, SENSOR_OFFERED)
+        self._measured = JointPublisher(
+            self, names.SLAVE_MEASURED, names.JOINTS, ('position',), SENSOR_OFFERED
+        )
         device = self._device_name = p.device or self.rig.devices.tracker
         if device == 'simulated':
             plant, self._seed = context.plant, context.seed_of(2)
@@ -66,7 +62,9 @@ class EmTrackerNode(EndoscopeNode):
             self._faults = recording_faults(plant)
             self._first_ns: int | None = None
             self._sampling = SampleClock(plant.sensors.tracker_rate)
-            JointSubscription(self, SIMULATED_BENDING, JOINTS, self._on_bending, LOCK_STEP)
+            JointSubscription(
+                self, names.SIMULATED_BENDING, names.JOINTS, self._on_bending, LOCK_STEP
+            )
         else:
             self._tracker = self._connect(device, p)
             self.ticker.add(self._on_tick)
@@ -173,7 +171,11 @@ class EmTrackerNode(EndoscopeNode):
             if trouble:
                 return ERROR, trouble, values
             if self._registration is None:
-                return WARN, f'hold the instrument straight and call {REGISTER_STRAIGHT}', values
+                return (
+                    WARN,
+                    f'hold the instrument straight and call {names.REGISTER_STRAIGHT}',
+                    values,
+                )
         age = self.ticker.monotonic_ns() - self._last_ns
         if self._measured.count == 0 or age > 500_000_000:
             return STALE, 'no poses', values

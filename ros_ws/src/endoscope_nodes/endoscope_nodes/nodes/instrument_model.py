@@ -8,14 +8,7 @@ from endoscope_bags.cdr_encoding import TransformEncoder
 from endoscope_bags.message_types import TF_MESSAGE
 from endoscope_core.kinematics import Vertebrae, robot_description
 from endoscope_core.rig import InstrumentFacts
-from endoscope_nodes.names import (
-    JOINT_STATES,
-    JOINTS,
-    ROBOT_DESCRIPTION,
-    ROBOT_DESCRIPTION_OF_ALL,
-    SLAVE_MEASURED,
-    TRANSFORMS,
-)
+from endoscope_nodes import names
 from endoscope_nodes.runtime.diagnostics import OK, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
@@ -54,16 +47,16 @@ class InstrumentModelNode(EndoscopeNode):
         self._last_ns = 0
         self._out_of_reach = 0
         description = String(data=robot_description(self._section))
-        for topic in (ROBOT_DESCRIPTION, ROBOT_DESCRIPTION_OF_ALL):
+        for topic in (names.ROBOT_DESCRIPTION, names.ROBOT_DESCRIPTION_OF_ALL):
             self.create_publisher(String, topic, RESULT).publish(description)
         self._joints = JointPublisher(
-            self, JOINT_STATES, self._section.joint_names, ('position',), SENSOR_OFFERED
+            self, names.JOINT_STATES, self._section.joint_names, ('position',), SENSOR_OFFERED
         )
         self._transforms = JointTransforms(self._section)
         self._transforms_out = self.create_publisher(
-            message_class(TF_MESSAGE), TRANSFORMS, SENSOR_OFFERED
+            message_class(TF_MESSAGE), names.TRANSFORMS, SENSOR_OFFERED
         )
-        JointSubscription(self, SLAVE_MEASURED, JOINTS, self._on_bending, SENSOR_ASKED)
+        JointSubscription(self, names.SLAVE_MEASURED, names.JOINTS, self._on_bending, SENSOR_ASKED)
         self.diagnostics.add('model', self._report)
 
     def _on_bending(self, sample: JointSample) -> None:

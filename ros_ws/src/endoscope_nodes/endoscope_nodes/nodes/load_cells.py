@@ -12,13 +12,7 @@ from endoscope_devices.load_cells import (
     save_tare,
     tare_path,
 )
-from endoscope_nodes.names import (
-    MOTOR_MEASURED,
-    MOTORS,
-    SIMULATED_WIRES,
-    WIRES,
-    WIRES_MEASURED,
-)
+from endoscope_nodes import names
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, STALE, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
@@ -44,16 +38,20 @@ class LoadCellsNode(EndoscopeNode):
         self._last_ns = 0
         self._told = ''
         self._cells: ModbusLoadCells | None = None
-        self._measured = JointPublisher(self, WIRES_MEASURED, WIRES, ('effort',), SENSOR_OFFERED)
+        self._measured = JointPublisher(
+            self, names.WIRES_MEASURED, names.WIRES, ('effort',), SENSOR_OFFERED
+        )
         device = self._device_name = p.device or self.rig.devices.load_cells
         if device == 'simulated':
             sensors = context.plant.sensors
             self._sensors = SensorModel(sensors, context.seed_of(1))
             self._sampling = SampleClock(sensors.load_cell_rate)
-            JointSubscription(self, SIMULATED_WIRES, WIRES, self._on_wires, LOCK_STEP)
+            JointSubscription(self, names.SIMULATED_WIRES, names.WIRES, self._on_wires, LOCK_STEP)
         else:
             self._cells = self._connect(device, p)
-            JointSubscription(self, MOTOR_MEASURED, MOTORS, self._on_shafts, SENSOR_ASKED)
+            JointSubscription(
+                self, names.MOTOR_MEASURED, names.MOTORS, self._on_shafts, SENSOR_ASKED
+            )
             self.ticker.add(self._on_tick)
         self.serve('~/tare', self._tare)
         self.diagnostics.add('cells', self._report, device)
@@ -73,7 +71,7 @@ class LoadCellsNode(EndoscopeNode):
                 raise ParameterError(f"load_cells: parameter '{name}' is empty: {device} needs it")
         try:
             calibration = apply_saved_tare(
-                tare_path(p.calibration_file), load_calibration(p.calibration_file, WIRES)
+                tare_path(p.calibration_file), load_calibration(p.calibration_file, names.WIRES)
             )
             cells = CONNECTIONS[device](p.port, calibration)
         except FileError as error:

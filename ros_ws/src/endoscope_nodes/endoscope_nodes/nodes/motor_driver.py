@@ -1,7 +1,6 @@
 """Drives the motor shafts: the simulated slave or a bus of servos, the same node for both."""
 
 from collections import deque
-from collections.abc import Sequence
 
 from std_msgs.msg import String
 
@@ -11,18 +10,7 @@ from endoscope_devices.dynamixel.control_table import BAUD_CODES
 from endoscope_devices.dynamixel.dynamixel_motors import DynamixelMotors
 from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
 from endoscope_devices.simulated_slave import SimulatedSlave
-from endoscope_nodes.names import (
-    JOINTS,
-    MOTOR_COMMAND,
-    MOTOR_MEASURED,
-    MOTOR_REBOOT,
-    MOTOR_SETPOINT,
-    MOTORS,
-    OPERATING_STATE,
-    SIMULATED_BENDING,
-    SIMULATED_WIRES,
-    WIRES,
-)
+from endoscope_nodes import names
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
@@ -58,10 +46,10 @@ class MotorDriverNode(EndoscopeNode):
         # bounds what it lets pass.
         commands = CommandLimits(facts.reach, 1.25 * facts.speed, facts.entry_step, timeout_ns)
         limits = (facts.reach, facts.speed, facts.acceleration, facts.step)
-        self.motion = ShaftMotion(commands, MotionLimits.either_way(len(MOTORS), *limits))
+        self.motion = ShaftMotion(commands, MotionLimits.either_way(len(names.MOTORS), *limits))
         self._slave = None
         if device == 'simulated':
-            self._slave = SimulatedSlave(context.plant, MOTORS, context.seed_of(0))
+            self._slave = SimulatedSlave(context.plant, names.MOTORS, context.seed_of(0))
         self._device: MotorDevice = self._slave or self._dynamixel(bus)
         try:
             self._device.open()
@@ -71,33 +59,41 @@ class MotorDriverNode(EndoscopeNode):
         self._arrived: list[tuple[JointSample, int, str]] = []
         self.latency_ns: deque[int] = deque(maxlen=1000)
         self._measured = JointPublisher(
-            self, MOTOR_MEASURED, MOTORS, ('position', 'velocity', 'effort'), SENSOR_OFFERED
+            self,
+            names.MOTOR_MEASURED,
+            names.MOTORS,
+            ('position', 'velocity', 'effort'),
+            SENSOR_OFFERED,
         )
-        self._setpoint = JointPublisher(self, MOTOR_SETPOINT, MOTORS, ('position',), SENSOR_OFFERED)
+        self._setpoint = JointPublisher(
+            self, names.MOTOR_SETPOINT, names.MOTORS, ('position',), SENSOR_OFFERED
+        )
         self._told: tuple[float, ...] = ()
         self._told_ns = 0
         self._torque = False
         if self._slave is not None:
-            self._wires = JointPublisher(self, SIMULATED_WIRES, WIRES, ('effort',), LOCK_STEP)
+            self._wires = JointPublisher(
+                self, names.SIMULATED_WIRES, names.WIRES, ('effort',), LOCK_STEP
+            )
             self._bending = JointPublisher(
-                self, SIMULATED_BENDING, JOINTS, ('position',), LOCK_STEP
+                self, names.SIMULATED_BENDING, names.JOINTS, ('position',), LOCK_STEP
             )
         self._state = ''
         self._session = SessionWatch(
             self, lambda: self._switch_torque(True), self._let_go, self.motion.session
         )
-        self.create_subscription(String, OPERATING_STATE, self._on_state, RESULT)
+        self.create_subscription(String, names.OPERATING_STATE, self._on_state, RESULT)
         self._commands = JointSubscription(
             self,
-            MOTOR_COMMAND,
-            MOTORS,
+            names.MOTOR_COMMAND,
+            names.MOTORS,
             self._on_command,
             COMMAND,
             exact=True,
             on_malformed=lambda reason: self.motion.gate.refuse(Refusal.MALFORMED, reason),
         )
         self._senders = self._session.senders_of(self._commands.subscription)
-        self._session.obeys(MOTOR_COMMAND, self.motion.gate)
+        self._session.obeys(names.MOTOR_COMMAND, self.motion.gate)
         self.diagnostics.add(
             'commands', CommandReport(self.motion.gate, self.ticker, self._session.leave)
         )
@@ -111,8 +107,8 @@ class MotorDriverNode(EndoscopeNode):
 
     def _dynamixel(self, parameters: DynamixelParameters) -> MotorDevice:
         self.require_real_time(self._device_name)
-        motors = build_motors(parameters, MOTORS, self.rig.timeouts.command)
-        self.serve(MOTOR_REBOOT, lambda: self._reboot(motors))
+        motors = build_motors(parameters, self.rig.timeouts.command)
+        self.serve(names.MOTOR_REBOOT, lambda: self._reboot(motors))
         return motors
 
     def _reboot(self, motors: DynamixelMotors) -> tuple[bool, str]:
@@ -142,7 +138,7 @@ class MotorDriverNode(EndoscopeNode):
         self._judge_what_arrived()
         goal = self.motion.turn(self.ticker.monotonic_ns(), periods * TICK_S)
         self._session.tell()
-        reading = self._device.exchange(goal or (0.0,) * len(MOTORS), periods)
+        reading = self._device.exchange(goal or (0.0,) * len(names.MOTORS), periods)
         if self._slave is not None:
             # The plant has just gone on under it for these periods.
             self._tell_setpoint(stamp_ns - periods * TICK_NS, self._slave.goal)
@@ -216,19 +212,16 @@ class MotorDriverNode(EndoscopeNode):
         self._device.close()
 
 
-def build_motors(
-    parameters: DynamixelParameters, names: Sequence[str], goal_timeout: float
-) -> DynamixelMotors:
+def build_motors(p: DynamixelParameters, goal_timeout: float) -> DynamixelMotors:
     """Make the bus; a goal not renewed for `goal_timeout` s is given up."""
-    p = parameters
     for name in ('servo_ids', 'servo_directions', 'servo_zeros'):
-        if len(getattr(p, name)) != len(names):
+        if len(getattr(p, name)) != len(names.MOTORS):
             raise ParameterError(
                 f"motor_driver: parameter '{name}' has {len(getattr(p, name))} values; give one "
-                f'for each of {", ".join(names)}'
+                f'for each of {", ".join(names.MOTORS)}'
             )
-    if len(set(p.servo_ids)) != len(names):
-        raise ParameterError("motor_driver: parameter 'servo_ids' names a servo twice")
+    if len(set(p.servo_ids)) != len(names.MOTORS):
+        raise ParameterError("motor_driver: parameter 'servo_ids' MOTORS a servo twice")
     if 0 in p.servo_directions:
         raise ParameterError("motor_driver: parameter 'servo_directions' is 0; give 1 or -1")
     if p.baud not in BAUD_CODES.values():
@@ -236,7 +229,7 @@ def build_motors(
         raise ParameterError(f"motor_driver: parameter 'baud' is {p.baud}; give one of {known}")
     mounts = [
         ServoMount(*mount)
-        for mount in zip(names, p.servo_ids, p.servo_directions, p.servo_zeros, strict=True)
+        for mount in zip(names.MOTORS, p.servo_ids, p.servo_directions, p.servo_zeros, strict=True)
     ]
     try:
         settings = BusSettings(

@@ -8,20 +8,7 @@ from std_msgs.msg import Header, String
 
 from endoscope_core.safety import Answer, OperatingState, OperatingStateMachine, TensionGuard
 from endoscope_core.safety.motion_session import HEARTBEAT_S
-from endoscope_nodes.names import (
-    AWAITED,
-    DIAGNOSTICS,
-    MOTION_SESSION,
-    MOTOR_COMMAND,
-    MOTOR_MEASURED,
-    OPERATING_STATE,
-    REFUSAL,
-    REFUSAL_CODE,
-    REFUSED_NS,
-    STATE_COMMAND,
-    WIRES,
-    WIRES_MEASURED,
-)
+from endoscope_nodes import names
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
@@ -47,18 +34,18 @@ class SupervisorNode(EndoscopeNode):
         super().__init__('supervisor', context)
         self._timeout_ns = self.rig.timeouts.stream_ns
         self.machine = OperatingStateMachine()
-        self._guard = TensionGuard(WIRES, self.rig.tension.ceiling)
+        self._guard = TensionGuard(names.WIRES, self.rig.tension.ceiling)
         self._refused, self._refused_ns = Answer(True), 0
         self._own = f'{self.get_namespace().rstrip("/")}/'
         self._watched = [self.resolve_topic_name(t.name) for t in TOPICS if t.one_sender]
-        self._states = self.create_publisher(String, OPERATING_STATE, RESULT)
-        self._sessions = self.create_publisher(Header, MOTION_SESSION, EVENT)
-        self._motor = StreamWatch.of(self, MOTOR_MEASURED, SENSOR_ASKED)
-        self._wires = StreamWatch(self.ticker, WIRES_MEASURED)
+        self._states = self.create_publisher(String, names.OPERATING_STATE, RESULT)
+        self._sessions = self.create_publisher(Header, names.MOTION_SESSION, EVENT)
+        self._motor = StreamWatch.of(self, names.MOTOR_MEASURED, SENSOR_ASKED)
+        self._wires = StreamWatch(self.ticker, names.WIRES_MEASURED)
         self._streams = self._motor, self._wires
-        JointSubscription(self, WIRES_MEASURED, WIRES, self._on_wires, SENSOR_ASKED)
-        self.create_subscription(String, STATE_COMMAND, self._on_command, EVENT)
-        self.create_subscription(DiagnosticArray, DIAGNOSTICS, self._on_diagnostics, EVENT)
+        JointSubscription(self, names.WIRES_MEASURED, names.WIRES, self._on_wires, SENSOR_ASKED)
+        self.create_subscription(String, names.STATE_COMMAND, self._on_command, EVENT)
+        self.create_subscription(DiagnosticArray, names.DIAGNOSTICS, self._on_diagnostics, EVENT)
         self.diagnostics.add('operating state', self._report)
         self.ticker.every(HEARTBEAT_S, self._beat)
         self._check()
@@ -104,7 +91,7 @@ class SupervisorNode(EndoscopeNode):
 
     def _on_wires(self, sample: JointSample) -> None:
         self._wires.note()
-        tension = sample.effort or (math.nan,) * len(WIRES)
+        tension = sample.effort or (math.nan,) * len(names.WIRES)
         self._note('tension', self._guard.update(tension))
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
@@ -119,8 +106,8 @@ class SupervisorNode(EndoscopeNode):
     def _check(self) -> None:
         for watch in self._streams:
             self._note(watch.topic, watch.trouble(self._timeout_ns))
-        deserted = self.machine.session and not self.count_publishers(MOTOR_COMMAND)
-        self._note('compensator', f'nobody sends {MOTOR_COMMAND}' if deserted else '')
+        deserted = self.machine.session and not self.count_publishers(names.MOTOR_COMMAND)
+        self._note('compensator', f'nobody sends {names.MOTOR_COMMAND}' if deserted else '')
         for topic in self._watched:
             crowded = self.count_publishers(topic) > 1
             self._note(f'senders of {topic}', senders_in_words(self, topic) if crowded else '')
@@ -139,10 +126,10 @@ class SupervisorNode(EndoscopeNode):
             'session': machine.session,
             'cause': machine.cause,
             'present causes': '; '.join(machine.present_causes.values()),
-            AWAITED: '; '.join(w.trouble(0) for w in self._streams if not w.ever_heard),
-            REFUSAL: self._refused.reason,
-            REFUSAL_CODE: self._refused.code,
-            REFUSED_NS: self._refused_ns,
+            names.AWAITED: '; '.join(w.trouble(0) for w in self._streams if not w.ever_heard),
+            names.REFUSAL: self._refused.reason,
+            names.REFUSAL_CODE: self._refused.code,
+            names.REFUSED_NS: self._refused_ns,
             'peak tension [N]': self._guard.peak,
         }
         if machine.state is OperatingState.FAULT:

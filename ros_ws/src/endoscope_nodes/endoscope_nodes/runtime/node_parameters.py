@@ -20,27 +20,18 @@ from endoscope_core.choices import (
     SOURCES,
     TRACKER_DEVICES,
 )
-from endoscope_nodes.names import (
-    CALIBRATION_COMMAND,
-    CORRECTION,
-    JOINTS,
-    MOTOR_COMMAND,
-    MOTOR_MEASURED,
-    SLAVE_COMMAND,
-    SLAVE_MEASURED,
-    WIRES_MEASURED,
-)
+from endoscope_nodes import names
 from endoscope_nodes.runtime.parameters import parameter
 from endoscope_nodes.topics import RECORDED
 
 FOLLOWED = (
-    SLAVE_COMMAND,
-    CALIBRATION_COMMAND,
-    CORRECTION,
-    MOTOR_COMMAND,
-    SLAVE_MEASURED,
-    MOTOR_MEASURED,
-    WIRES_MEASURED,
+    names.SLAVE_COMMAND,
+    names.CALIBRATION_COMMAND,
+    names.CORRECTION,
+    names.MOTOR_COMMAND,
+    names.SLAVE_MEASURED,
+    names.MOTOR_MEASURED,
+    names.WIRES_MEASURED,
 )
 """Streams that the conductor can wait for."""
 
@@ -291,7 +282,7 @@ class ConsoleParameters:
         'periodic', 'motion that is played', choices=PLAYED_MOTIONS, dynamic=True
     )
     joints: tuple[str, ...] = parameter(
-        JOINTS, 'joints that the motion moves', choices=JOINTS, dynamic=True
+        names.JOINTS, 'joints that the motion moves', choices=names.JOINTS, dynamic=True
     )
     command_file: str = parameter(
         '', 'CSV file that is played, columns time [s], bend_x and bend_y [rad]', dynamic=True
@@ -351,7 +342,7 @@ class ConductorParameters:
     """Parameters of the conductor."""
 
     wait_for: tuple[str, ...] = parameter(
-        (MOTOR_MEASURED, WIRES_MEASURED),
+        (names.MOTOR_MEASURED, names.WIRES_MEASURED),
         'topics without whose answer time never goes on',
         choices=FOLLOWED,
     )
