@@ -13,8 +13,8 @@ from private_domain import private_domain
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState, Joy
 
+from endoscope_nodes.client.graph_client import joined_graph
 from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
-from endoscope_nodes.client.joined_graph import joined_graph
 from endoscope_nodes.names import JOINTS, MASTER_CLUTCH, MOTOR_COMMAND, MOTORS, SLAVE_COMMAND
 from endoscope_nodes.runtime.qos import EVENT, profile
 from endoscope_nodes.runtime.streams import JointReader

@@ -21,9 +21,9 @@ from endoscope_bags import open_bag
 from endoscope_console.explanations import EXPERIMENT_FILE, REPORT_FILE
 from endoscope_core.physics import save_plant
 from endoscope_core.signals.command_file import write_command_file
+from endoscope_nodes.client.graph_client import joined_graph
 from endoscope_nodes.client.graph_listener import GraphRefusedError
 from endoscope_nodes.client.handle_sender import HandleSender
-from endoscope_nodes.client.joined_graph import joined_graph
 from endoscope_nodes.names import CONSOLE_LOG, MASTER_CLUTCH, RECORDER_STOP
 from endoscope_nodes.runtime.qos import EVENT
 from endoscope_nodes.topics import RECORDED

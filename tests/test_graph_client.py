@@ -5,9 +5,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from simulated_graph import SimulatedGraph
 
 from endoscope_core.errors import EndoscopeError
-from endoscope_nodes.client.graph_client import GraphClient
+from endoscope_nodes.client.graph_client import GraphClient, joined_graph
 from endoscope_nodes.client.graph_listener import GraphRefusedError
-from endoscope_nodes.client.joined_graph import joined_graph
 from endoscope_nodes.names import DIAGNOSTICS
 
 ABORTED = 'aborted: the motion session has ended'

@@ -240,13 +240,14 @@ def test_what_nobody_asked_for_ends_at_rest_and_goes_on_with_the_next_session(
 def test_what_a_person_asked_for_is_not_ended_at_rest(tmp_path, monkeypatch):
     session, say = unasked(tmp_path, monkeypatch, rest=1.0, room=1.0)
     with session:
-        recorder, answer = session.recorder, Trigger.Response
+        recorder = session.recorder
         # Who asks while it records gets a refusal, and what is recorded is theirs.
-        assert not recorder._on_start(Trigger.Request(), answer()).success
+        begun, _ = recorder.start_as_asked()
+        assert not begun
         say('DISABLED')
         session.serve(3.5)
         assert said_of(session)[1] == 'recording'
-        recorder._on_stop(Trigger.Request(), answer())
+        recorder.stop_as_asked()
         say('ENABLED')
         session.serve(0.5)
         assert said_of(session) == (OK, 'not recording', None)
@@ -267,7 +268,8 @@ def test_what_nobody_asked_for_has_little_room_and_its_end_is_a_warning(tmp_path
         say('ENABLED')
         session.serve(0.5)
         assert said_of(session)[0] == WARN
-        assert session.recorder._on_start(Trigger.Request(), Trigger.Response()).success
+        begun, _ = session.recorder.start_as_asked()
+        assert begun
         assert said_of(session)[:2] == (OK, 'recording')
         assert session.recorder.last_report.complete
     assert session.runtime.exit_code == 0

@@ -36,7 +36,6 @@ from endoscope_bags.mcap_records import (
 from endoscope_bags.unpacking import Allowance, ChunkError, chunk_head, unpacked
 
 UNSURE_NAMES = 'the names of topics agree with no checksum'
-_CUT = 'ends in the middle'
 _CRC_STEP = 1 << 24
 _MOST_DAMAGE = 100
 _LOOKED_AT = 512
@@ -151,6 +150,7 @@ class _Pass:
         self._statistics: Statistics | None = None
         self._data_end: int | None = None
         self._summary_holds = False
+        self._corrupt = False  # beyond that the end of the file is missing
         self._n_chunks = 0
         self._chunked = False
         # Channels that the checksum of a chunk vouches for.
@@ -251,12 +251,13 @@ class _Pass:
         self.scan.truncated = True
         self._damaged(
             TruncatedBagError,
-            f'{_CUT}, after {position} sound bytes of {len(self._data)}',
+            f'ends in the middle, after {position} sound bytes of {len(self._data)}',
         )
 
     def _damaged(self, kind: type[TruncatedBagError | CorruptBagError], what: str) -> None:
         if not self._salvage:
             raise kind(f'{self.scan.path}: {what}; try `endoscope bag recover`')
+        self._corrupt = self._corrupt or kind is CorruptBagError
         if len(self.scan.damage) < _MOST_DAMAGE:
             self.scan.damage.append(what)
         elif len(self.scan.damage) == _MOST_DAMAGE:
@@ -329,10 +330,9 @@ class _Pass:
         first, second = (written, summary) if self._summary_holds else (summary, written)
         self.scan.schemas = first.schemas | second.schemas
         self.scan.channels = first.channels | second.channels
-        if not (self._summary_holds or self.scan.channels.keys() <= self._in_chunks):
-            unsure = [what for what in self.scan.damage if not what.startswith(_CUT)]
-            if unsure:
-                self._damaged(CorruptBagError, UNSURE_NAMES)
+        vouched = self._summary_holds or self.scan.channels.keys() <= self._in_chunks
+        if self._corrupt and not vouched:
+            self._damaged(CorruptBagError, UNSURE_NAMES)
         messages = self._table()
         counted = self._statistics.message_count if self._statistics else len(messages)
         if counted != len(messages):

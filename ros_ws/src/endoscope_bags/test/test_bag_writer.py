@@ -225,7 +225,7 @@ def test_a_writer_that_is_not_atomic_keeps_what_it_has(tmp_path):
 
 def test_a_place_that_cannot_be_written_is_one_clear_error(tmp_path):
     (tmp_path / 'file').write_text('')
-    with pytest.raises(BagError, match='cannot be made'):
+    with pytest.raises(BagError, match='cannot be created'):
         BagWriter(tmp_path / 'file' / 'bag')
 
 

@@ -25,9 +25,9 @@ from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import CONSOLE, GraphRefusedError, Health
 from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
 from endoscope_nodes.client.handle_sender import handle_senders
-from endoscope_nodes.client.joined_graph import joined_node
 from endoscope_nodes.names import CONSOLE_LOG, FINISHED
 from endoscope_nodes.runtime.diagnostics import OK, WARN, status
+from endoscope_nodes.runtime.environment import joined_node
 from endoscope_nodes.runtime.qos import EVENT
 
 NODE = 'console_web'

@@ -14,7 +14,7 @@ from rclpy.node import Node
 
 from endoscope_bags.message_types import JOINT_STATE, message_type
 from endoscope_core.errors import EndoscopeError
-from endoscope_nodes.client.joined_graph import joined_node
+from endoscope_nodes.runtime.environment import joined_node
 from endoscope_nodes.runtime.qos import profile
 from endoscope_nodes.runtime.recorded_topics import message_class
 from endoscope_nodes.runtime.streams import RawSubscription

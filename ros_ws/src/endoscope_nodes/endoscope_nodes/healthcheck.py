@@ -17,42 +17,29 @@ _LONGEST_S = 5.0
 def is_heard(node: str, namespace: str, longest_s: float) -> bool:
     """Listen to ``/diagnostics`` for up to `longest_s` s until a node speaks, as it does each s."""
     # Only now: whoever asks for help need not wait for ROS.
-    import rclpy
     from diagnostic_msgs.msg import DiagnosticArray
-    from rclpy.context import Context
     from rclpy.executors import SingleThreadedExecutor
-    from rclpy.node import Node
 
     from endoscope_nodes.names import DIAGNOSTICS
-    from endoscope_nodes.runtime.environment import stay_on_this_machine
+    from endoscope_nodes.runtime.environment import joined_node
     from endoscope_nodes.runtime.qos import EVENT
 
-    stay_on_this_machine()
     names = {node, f'/{namespace.strip("/")}/{node}'}
-    context = Context()
-    rclpy.init(args=[], context=context)
-    listener = Node(
-        f'healthcheck_of_{node}',
-        context=context,
-        enable_rosout=False,
-        start_parameter_services=False,
-    )
     heard: list[str] = []
 
     def listen(message: DiagnosticArray) -> None:
         heard.extend(status.name.partition(':')[0] for status in message.status)
 
-    listener.create_subscription(DiagnosticArray, DIAGNOSTICS, listen, EVENT)
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(listener)
-    deadline = time.monotonic() + longest_s
-    try:
-        while not names & set(heard) and (left := deadline - time.monotonic()) > 0:
-            executor.spin_once(timeout_sec=left)
-    finally:
-        executor.shutdown()
-        listener.destroy_node()
-        context.try_shutdown()
+    with joined_node(f'healthcheck_of_{node}', '') as listener:
+        listener.create_subscription(DiagnosticArray, DIAGNOSTICS, listen, EVENT)
+        executor = SingleThreadedExecutor(context=listener.context)
+        executor.add_node(listener)
+        deadline = time.monotonic() + longest_s
+        try:
+            while not names & set(heard) and (left := deadline - time.monotonic()) > 0:
+                executor.spin_once(timeout_sec=left)
+        finally:
+            executor.shutdown()
     return bool(names & set(heard))
 
 

@@ -18,7 +18,7 @@ from sensor_msgs.msg import JointState, Joy
 
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.exit_status import ClosedOnExit
-from endoscope_nodes.client.joined_graph import joined_graph
+from endoscope_nodes.client.graph_client import joined_graph
 from endoscope_nodes.names import (
     JOINTS,
     MASTER_CLUTCH,

@@ -80,8 +80,8 @@ def run(args: argparse.Namespace) -> int:
 
     from endoscope_bringup.operating.actions import act, paused_when_interrupted
     from endoscope_core.errors import printable
+    from endoscope_nodes.client.graph_client import joined_graph
     from endoscope_nodes.client.graph_listener import GraphRefusedError
-    from endoscope_nodes.client.joined_graph import joined_graph
 
     name = ' '.join(filter(None, (args.action, getattr(args, 'what', ''))))
     try:

@@ -76,8 +76,8 @@ def run(args: argparse.Namespace) -> int:
 
     check_terminal()
     from endoscope_bringup.teleop.teleoperation import teleoperate
+    from endoscope_nodes.client.graph_client import joined_graph
     from endoscope_nodes.client.graph_listener import GraphRefusedError
-    from endoscope_nodes.client.joined_graph import joined_graph
 
     try:
         with joined_graph('teleop', args.namespace) as client:

@@ -41,8 +41,8 @@ def run(args: argparse.Namespace) -> int:
     import sys
 
     from endoscope_bringup.operating.listening import echo, listing, rate
+    from endoscope_nodes.client.graph_client import joined_graph
     from endoscope_nodes.client.graph_listener import GraphRefusedError
-    from endoscope_nodes.client.joined_graph import joined_graph
 
     count = 1 if args.once else args.count
     try:

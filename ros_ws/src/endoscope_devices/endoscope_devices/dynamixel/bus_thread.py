@@ -37,6 +37,8 @@ from endoscope_devices.dynamixel.servo_block import (
     BLOCK_ADDRESS,
     BLOCK_SIZE,
     BlockJudge,
+    Doubt,
+    Failure,
     Freshness,
     ServoBlock,
     decode_block,
@@ -258,18 +260,18 @@ class BusThread:
         replies = bus.transact(request, self._ids, BLOCK_SIZE, self.settings.fast)
         received_ns = time.monotonic_ns()
         self.figures.cycles += 1
-        failure, reason = self._take(replies, asked_ns, received_ns)
-        if not failure:
+        doubt = self._take(replies, asked_ns, received_ns)
+        if doubt is None:
             return
-        self.figures.failures[reason] += 1
-        self.figures.last_failure = failure
+        self.figures.failures[doubt.failure] += 1
+        self.figures.last_failure = doubt.words
         bus.drain(_DRAIN_S)
         since_ns = max(self.figures.last_ns, self._patient_from_ns)
         silence_s = (time.monotonic_ns() - since_ns) * 1e-9
         if silence_s > self.settings.fault_after:
-            self._fail(f'no valid reading for {silence_s * 1e3:.0f} ms: {failure}')
-        if reason == 'restarted' or silence_s > _RETRY_S:
-            raise BusError(f'{failure}; it is set up again')
+            self._fail(f'no valid reading for {silence_s * 1e3:.0f} ms: {doubt.words}')
+        if doubt.failure is Failure.RESTARTED or silence_s > _RETRY_S:
+            raise BusError(f'{doubt.words}; it is set up again')
 
     def _goal_now(self) -> tuple[float, ...] | None:
         """Goal to send: the newest, or what is held; None while torque is off."""
@@ -295,33 +297,30 @@ class BusThread:
             for mount, angle in zip(self.mounts, shafts, strict=True)
         }
 
-    def _take(self, replies: dict[int, Reply], asked_ns: int, received_ns: int) -> tuple[str, str]:
-        """Take the answers of a cycle; a failure in words and in short."""
+    def _take(self, replies: dict[int, Reply], asked_ns: int, received_ns: int) -> Doubt | None:
+        """Take the answers of a cycle; why they give no reading, if they do not."""
         blocks: list[ServoBlock] = []
         for k, (mount, judge, health) in enumerate(
             zip(self.mounts, self._judges, self.health, strict=True)
         ):
             reply = replies.get(mount.device)
             if reply is None:
-                return f'servo {mount.device} does not answer', 'no answer'
+                return Doubt(Failure.NO_ANSWER, f'servo {mount.device} does not answer')
             if len(reply.data) != BLOCK_SIZE:
-                return f'servo {mount.device} refuses to be read', 'refused'
+                return Doubt(Failure.REFUSED, f'servo {mount.device} refuses to be read')
             health.error = reply.error
             block = decode_block(reply.data)
-            freshness, why = judge.judge(
-                block, self.settings.watchdog_counts, asked_ns, received_ns
-            )
-            if freshness is None:
-                short = 'restarted' if 'restarted' in why else 'not credible'
-                return f'servo {mount.device} {why}', short
+            verdict = judge.judge(block, self.settings.watchdog_counts, asked_ns, received_ns)
+            if isinstance(verdict, Doubt):
+                return Doubt(verdict.failure, f'servo {mount.device} {verdict.words}')
             # The servos' milliseconds do not begin at the same time.
-            self._unpublished[k] |= freshness is Freshness.NEW
+            self._unpublished[k] |= verdict is Freshness.NEW
             blocks.append(block)
         self.figures.last_ns = received_ns
         if all(self._unpublished):
             self._publish(blocks)
         self._notice(blocks)
-        return '', ''
+        return None
 
     def _publish(self, blocks: Sequence[ServoBlock]) -> None:
         mounts = self.mounts
@@ -373,7 +372,7 @@ class BusThread:
         except BusError as error:
             if health.error & ALERT:
                 health.hardware = 'a hardware error that it does not name'
-            self.figures.failures['no answer'] += 1
+            self.figures.failures[Failure.NO_ANSWER] += 1
             self.figures.last_failure = str(error)
             return
         health.voltage = int.from_bytes(slow[:2], 'little') * PRESENT_INPUT_VOLTAGE.scale

@@ -2,7 +2,8 @@
 
 import struct
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, StrEnum
+from typing import NamedTuple
 
 from endoscope_devices.dynamixel.control_table import (
     BUS_WATCHDOG,
@@ -59,10 +60,6 @@ class TickClock:
         self._tick = -1
         self._seen_ns = 0
 
-    def forget(self) -> None:
-        """Take the next tick as it is: after a restart of the servo or a long silence."""
-        self._tick = -1
-
     def judge(self, tick: int, asked_ns: int, received_ns: int) -> Freshness:
         """Judge the tick of a reading; only a new one moves the clock.
 
@@ -117,6 +114,22 @@ def decode_block(data: bytes) -> ServoBlock:
     )
 
 
+class Failure(StrEnum):
+    """Why a cycle gives no reading, as the diagnostics count it."""
+
+    NO_ANSWER = 'no answer'
+    REFUSED = 'refused'
+    RESTARTED = 'restarted'
+    NOT_CREDIBLE = 'not credible'
+
+
+class Doubt(NamedTuple):
+    """Why a reading is not taken."""
+
+    failure: Failure
+    words: str  # to stand behind ``servo 1``
+
+
 class BlockJudge:
     """Decides whether a block of one servo is a true reading taken for this request.
 
@@ -132,33 +145,36 @@ class BlockJudge:
         self._last: ServoBlock | None = None
         self._last_ns = 0
 
-    def forget(self) -> None:
-        """Take the next block as it is: after the servo was set up."""
-        self.clock.forget()
-        self._last = None
-
     def judge(
         self, block: ServoBlock, watchdog: int, asked_ns: int, received_ns: int
-    ) -> tuple[Freshness | None, str]:
-        """Freshness of one block, or None and why it is refused.
+    ) -> Freshness | Doubt:
+        """Judge one block.
 
         `watchdog` is what Bus Watchdog(98) was set to; `asked_ns` and `received_ns` are our
         monotonic time in ns before the request and after the answer.
         """
         if block.watchdog not in (watchdog, -1):
-            return None, 'has lost its settings: it has restarted'
+            return Doubt(Failure.RESTARTED, 'has lost its settings: it has restarted')
         if self._last is not None:
             elapsed = (received_ns - self._last_ns) * 1e-9
             reach = self._max_speed * elapsed + JITTER
             if abs(block.position - self._last.position) > reach:
                 moved = abs(block.position - self._last.position)
-                return None, f'cannot have moved by {moved:.3g} rad in {elapsed * 1e3:.1f} ms'
+                return _incredible(
+                    f'cannot have moved by {moved:.3g} rad in {elapsed * 1e3:.1f} ms'
+                )
         if abs(block.velocity) > self._max_speed or abs(block.current) > self._max_current:
-            return None, (f'cannot turn at {block.velocity:.3g} rad/s with {block.current:.3g} A')
+            return _incredible(
+                f'cannot turn at {block.velocity:.3g} rad/s with {block.current:.3g} A'
+            )
         freshness = self.clock.judge(block.tick, asked_ns, received_ns)
         if freshness not in (Freshness.NEW, Freshness.SAME_TICK):
-            return None, f'sent a reading {freshness.value}'
+            return _incredible(f'sent a reading {freshness.value}')
         if freshness is Freshness.NEW:
             self._last = block
             self._last_ns = received_ns
-        return freshness, ''
+        return freshness
+
+
+def _incredible(words: str) -> Doubt:
+    return Doubt(Failure.NOT_CREDIBLE, words)

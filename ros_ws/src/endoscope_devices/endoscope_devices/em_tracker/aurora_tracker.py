@@ -64,45 +64,23 @@ class FrameClock:
 
 @dataclass(frozen=True)
 class TrackerSettings:
-    """How the tracker is read.
+    """How the tracker is read: times in s, rate in Hz."""
 
-    Attributes
-    ----------
-    tool
-        Which of the enabled sensors, from 1 on in the order of their ports.
-    latency
-        Time in s from measuring a frame to having it ready, by which stamps are put back.
-    frame_rate
-        Frames a second in Hz.
-    oldest
-        A frame that comes later than this, in s, is not published: its time of measurement is past
-        any use.
-    """
-
-    tool: int = 1
+    tool: int = 1  # which of the enabled sensors, from 1 on in the order of their ports
+    # Time in s from measuring a frame to having it ready, by which stamps are put back.
     latency: float = 0.0
-    frame_rate: float = 40.0
-    oldest: float = 0.1
+    frame_rate: float = 40.0  # Hz
+    oldest: float = 0.1  # s after which a frame that comes is of no more use
 
 
 @dataclass(frozen=True)
 class TrackerReading:
-    """The sensor in a frame that was not seen before.
+    """The sensor in a frame that was not seen before: in m, and by the field generator's axes."""
 
-    Attributes
-    ----------
-    time_ns
-        When it was measured, in ns of ``time.monotonic_ns``.
-    frame
-        Frame number.
-    position, orientation
-        m, shape (3,), and unit quaternion x, y, z, w, in the frame of the field generator.
-    """
-
-    time_ns: int
-    frame: int
-    position: tuple[float, ...]
-    orientation: tuple[float, ...]
+    time_ns: int  # when it was measured, of ``time.monotonic_ns``
+    frame: int  # number
+    position: tuple[float, ...]  # m, (3,)
+    orientation: tuple[float, ...]  # unit quaternion x, y, z, w
 
 
 class AuroraTracker(ReadingThread[TrackerReading]):
@@ -112,13 +90,6 @@ class AuroraTracker(ReadingThread[TrackerReading]):
     number betrays it.  Numbers increase, and no faster than the frame clock.  A pose that the tip
     cannot have come to is left out as well (`PoseCheck`).  A tracker that goes away, or counts its
     frames anew, is opened again for as long as the device is open.
-
-    Parameters
-    ----------
-    port
-        Device path.
-    settings
-        See :class:`TrackerSettings`.
     """
 
     def __init__(self, port: str, settings: TrackerSettings) -> None:

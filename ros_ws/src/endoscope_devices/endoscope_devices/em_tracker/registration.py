@@ -31,37 +31,13 @@ class RegistrationWindow:
             self._readings.popleft()
 
     def register(self, now_ns: int) -> StraightRegistration:
-        """Average them.
-
-        Parameters
-        ----------
-        now_ns
-            In ns of ``time.monotonic_ns``.
-
-        Raises
-        ------
-        RegistrationError
-            Too few, or the tip was not still.
-        """
+        """Average them at `now_ns` of ``time.monotonic_ns``; RegistrationError if the tip moved."""
         recent = [r for r in self._readings if r.time_ns >= now_ns - WINDOW_NS]
         return register_straight([r.position for r in recent], [r.orientation for r in recent])
 
 
 def save_registration(path: str | Path, registration: StraightRegistration) -> None:
-    """Keep a registration.
-
-    Parameters
-    ----------
-    path
-        YAML file to write.
-    registration
-        What to keep.
-
-    Raises
-    ------
-    OSError
-        The file cannot be written.
-    """
+    """Keep a registration in a YAML file."""
     content = {
         'registered': datetime.datetime.now(datetime.UTC).isoformat(timespec='seconds'),
         'position': list(registration.position),
@@ -71,18 +47,7 @@ def save_registration(path: str | Path, registration: StraightRegistration) -> N
 
 
 def load_registration(path: str | Path) -> StraightRegistration:
-    """Read what :func:`save_registration` wrote.
-
-    Parameters
-    ----------
-    path
-        YAML file.
-
-    Raises
-    ------
-    FileError
-        It cannot be read as a registration.
-    """
+    """Read what :func:`save_registration` wrote; FileError where that cannot be read."""
     what = 'registration'
     file = load(_Registration, path, what)
     norm = math.hypot(*file.orientation)

@@ -150,37 +150,19 @@ class TareLimits:
 
 @dataclass(frozen=True)
 class LoadCellCalibration:
-    """Content of a calibration file.
-
-    Attributes
-    ----------
-    wires
-        Cells by wire name, in the order asked for.
-    digest
-        SHA-256 of the file, which ties a stored tare to it.
-    """
+    """Content of a calibration file."""
 
     transmitter: Transmitter
-    wires: dict[str, WireCell]
+    wires: dict[str, WireCell]  # by name, in the order asked for
     faults: FaultLimits
     tare: TareLimits
-    digest: str
+    digest: str  # SHA-256 of the file, which ties a stored tare to it
 
 
 def load_calibration(path: str | Path, wires: Sequence[str]) -> LoadCellCalibration:
-    """Read a calibration file.
+    """Read a calibration file, which has to have these wires and no others.
 
-    Parameters
-    ----------
-    path
-        The YAML file.
-    wires
-        The wires that it has to have, and no others.
-
-    Raises
-    ------
-    FileError
-        It cannot be read, or a key is unknown, missing or out of range.
+    FileError where it cannot be read, or a key is unknown, missing or out of range.
     """
     what = 'load-cell calibration'
     file = load(_file(wires), path, what)

@@ -31,18 +31,10 @@ _KEPT = 2000
 
 @dataclass(frozen=True)
 class WireReading:
-    """Believable tensions of all W wires.
+    """Believable tensions of all W wires in N."""
 
-    Attributes
-    ----------
-    time_ns
-        When they were measured, in ns of ``time.monotonic_ns``.
-    tension
-        In N, shape (W,).
-    """
-
-    time_ns: int
-    tension: tuple[float, ...]
+    time_ns: int  # when they were measured, of ``time.monotonic_ns``
+    tension: tuple[float, ...]  # N, (W,)
 
 
 class ModbusLoadCells(ReadingThread[WireReading]):
@@ -50,13 +42,6 @@ class ModbusLoadCells(ReadingThread[WireReading]):
 
     A reading in which one channel cannot be believed is no reading: the others would pass for a
     whole one.  A line that goes away is opened again for as long as the device is open.
-
-    Parameters
-    ----------
-    calibration
-        Registers, sensitivities and limits.
-    line, framing
-        How to reach the transmitter; see :func:`modbus_rtu` and :func:`modbus_tcp`.
     """
 
     def __init__(self, calibration: LoadCellCalibration, line: Line, framing: Framing) -> None:
@@ -79,24 +64,12 @@ class ModbusLoadCells(ReadingThread[WireReading]):
         self._line_lost = True
 
     def note_shafts(self, velocity: Sequence[float]) -> None:
-        """Say how fast the motor shafts turn, so that moving wires are not tared.
-
-        Parameters
-        ----------
-        velocity
-            In rad/s, shape (J,).
-        """
+        """Take the speed of the motor shafts (J,) in rad/s, so that moving wires are not tared."""
         with self._lock:
             self._window.note_shafts(time.monotonic_ns(), velocity)
 
     def tared(self) -> LoadCellCalibration:
-        """The calibration in which the mean tension of the last second is zero.
-
-        Raises
-        ------
-        TareError
-            The wires move, are loaded, or cannot be read.
-        """
+        """The calibration in which the mean tension of the last second is zero, or TareError."""
         with self._lock:
             mean = self._window.mean(time.monotonic_ns())
             return with_zero(self.calibration, zero_after_tare(self.calibration, mean))
@@ -185,15 +158,7 @@ class ModbusLoadCells(ReadingThread[WireReading]):
 
 
 def modbus_rtu(port: str, calibration: LoadCellCalibration) -> ModbusLoadCells:
-    """Load cells at a serial port.
-
-    Parameters
-    ----------
-    port
-        Device path.
-    calibration
-        With the line's settings.
-    """
+    """Load cells at a serial port, a device path."""
     transmitter = calibration.transmitter
     return ModbusLoadCells(
         calibration,
@@ -203,20 +168,7 @@ def modbus_rtu(port: str, calibration: LoadCellCalibration) -> ModbusLoadCells:
 
 
 def modbus_tcp(address: str, calibration: LoadCellCalibration) -> ModbusLoadCells:
-    """Load cells at a TCP address.
-
-    Parameters
-    ----------
-    address
-        ``HOST`` or ``HOST:PORT``.
-    calibration
-        Registers and limits.
-
-    Raises
-    ------
-    DeviceError
-        The address cannot be understood.
-    """
+    """Load cells at a TCP address, ``HOST`` or ``HOST:PORT``; DeviceError if it is neither."""
     transmitter = calibration.transmitter
     return ModbusLoadCells(
         calibration, TcpLine(address), TcpFraming(transmitter.unit, transmitter.function)

@@ -94,20 +94,7 @@ def tare_path(calibration: str | Path) -> Path:
 
 
 def save_tare(path: str | Path, calibration: LoadCellCalibration) -> None:
-    """Keep the zeros of a calibration.
-
-    Parameters
-    ----------
-    path
-        See :func:`tare_path`.
-    calibration
-        Whose zeros.
-
-    Raises
-    ------
-    OSError
-        The file cannot be written.
-    """
+    """Keep the zeros of a calibration in the file of :func:`tare_path`."""
     now = datetime.datetime.now(datetime.UTC).isoformat(timespec='seconds')
     content = {
         'calibration_sha256': calibration.digest,
@@ -118,19 +105,9 @@ def save_tare(path: str | Path, calibration: LoadCellCalibration) -> None:
 
 
 def apply_saved_tare(path: str | Path, calibration: LoadCellCalibration) -> LoadCellCalibration:
-    """The calibration with the zeros that were kept, if any were.
+    """The calibration, as read from its file, with the zeros that were kept, if any were.
 
-    Parameters
-    ----------
-    path
-        See :func:`tare_path`.
-    calibration
-        As read from its file.
-
-    Raises
-    ------
-    FileError
-        The tare cannot be read, or belongs to another state of the calibration file.
+    FileError where the tare cannot be read, or belongs to another state of the calibration file.
     """
     if not Path(path).exists():
         return calibration

@@ -1,10 +1,12 @@
 """The operator's side of a running graph: asks it for something, and hears what it answers."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, cast
 
 from rclpy.client import Client
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.task import Future
 from std_msgs.msg import String
@@ -21,6 +23,7 @@ from endoscope_nodes.client.graph_listener import (
     NoGraphError,
 )
 from endoscope_nodes.client.order_feedback import CALIBRATE, HOME, OrderFeedback, OrderState
+from endoscope_nodes.runtime.environment import joined_node
 from endoscope_nodes.runtime.qos import EVENT
 
 WHOLE_S = 10.0
@@ -253,3 +256,22 @@ class GraphClient(GraphListener):
         for client in self._clients.values():
             self.node.destroy_client(client)
         self.node.destroy_publisher(self._orders)
+
+
+@contextmanager
+def joined_graph(name: str, namespace: str, domain: int | None = None) -> Iterator[GraphClient]:
+    """Join the graph of a namespace as a node of this name, for as long as the block lasts."""
+    with joined_node(name, namespace, domain) as node:
+        executor = SingleThreadedExecutor(context=node.context)
+        executor.add_node(node)
+
+        def serve(seconds: float) -> None:
+            end = time.monotonic() + seconds
+            while (left := end - time.monotonic()) > 0.0:
+                executor.spin_once(timeout_sec=left)
+
+        try:
+            with GraphClient(node, serve) as client:
+                yield client
+        finally:
+            executor.shutdown()

@@ -91,8 +91,8 @@ class RecorderNode(EndoscopeNode):
         self._warning = ''
         self._active_ns = 0
         self.last_report: SessionReport | None = None  # none before the first has ended
-        self.serve(RECORDER_START, self._start_when_asked)
-        self.serve(RECORDER_STOP, self._stop_when_asked)
+        self.serve(RECORDER_START, self.start_as_asked)
+        self.serve(RECORDER_STOP, self.stop_as_asked)
         if self.ticker.simulated:
             self.ticker.add(self._on_tick)
         else:
@@ -162,14 +162,16 @@ class RecorderNode(EndoscopeNode):
         if self._session is not None:
             self.stop()
 
-    def _start_when_asked(self) -> tuple[bool, str]:
+    def start_as_asked(self) -> tuple[bool, str]:
+        """Begin a recording that is the asker's; whether it has begun, and where or why not."""
         self._unasked, self._warning = False, ''
         try:
             return True, with_final_names(str(self.start()))
         except BagError as error:
             return False, str(error)
 
-    def _stop_when_asked(self) -> tuple[bool, str]:
+    def stop_as_asked(self) -> tuple[bool, str]:
+        """End the recording, and begin none again unasked; whether it is whole, and how it went."""
         self._unasked = False
         try:
             report = self.stop()

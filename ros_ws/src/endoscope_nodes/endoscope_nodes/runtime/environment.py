@@ -1,11 +1,17 @@
-"""What a process takes from its environment before ROS starts: who reaches it, its log level."""
+"""What a process takes from its environment before ROS starts: domain, range, log level."""
 
 import os
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+import rclpy
+from rclpy.context import Context
+from rclpy.exceptions import InvalidNamespaceException
 from rclpy.logging import LoggingSeverity, set_logger_level
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 
 from endoscope_core.choices import LOG_LEVEL_VARIABLE, LOG_LEVELS
 from endoscope_nodes.runtime.parameters import ParameterError
@@ -17,6 +23,8 @@ PROFILES_OF_FAST_DDS_3 = 'FASTDDS_DEFAULT_PROFILES_FILE'
 """Its name from ROS 2 Kilted on, which heeds the old one too and warns of it."""
 _MIDDLEWARE = 'fastrtps'
 _RCLPY_OF_JAZZY = 7
+LAST_DOMAIN = 232
+"""The ports of higher ones do not exist (DDSI-RTPS 2.5, 9.6.2)."""
 LOOPBACK = Path(__file__).with_name('this_machine.xml')
 # OFF is nobody but this process, for which Fast DDS listens at every address all the same.
 _ON_THIS_MACHINE = ('LOCALHOST', 'OFF')
@@ -70,3 +78,44 @@ def log_as_asked() -> None:
             f'{LOG_LEVEL_VARIABLE} is {asked!r}; give one of {", ".join(LOG_LEVELS)}'
         )
     set_logger_level('', LoggingSeverity[asked.upper()])
+
+
+@contextmanager
+def joined_node(name: str, namespace: str, domain: int | None = None) -> Iterator[Node]:
+    """A node of this name in the namespace of a graph, which its owner has to serve."""
+    stay_on_this_machine()
+    log_as_asked()
+    given = os.environ.get('ROS_DOMAIN_ID', '')
+    if domain is None and given and not (given.isdecimal() and int(given) <= LAST_DOMAIN):
+        raise ParameterError(
+            f'ROS_DOMAIN_ID is {given!r}; give a whole number from 0 to {LAST_DOMAIN}'
+        )
+    context = Context()
+    rclpy.init(
+        args=[], context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO
+    )
+    try:
+        with _node(name, namespace, context) as node:
+            yield node
+    finally:
+        context.try_shutdown()
+
+
+@contextmanager
+def _node(name: str, namespace: str, context: Context) -> Iterator[Node]:
+    try:
+        node = Node(
+            name,
+            context=context,
+            namespace=f'/{namespace.strip("/")}',
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
+    except InvalidNamespaceException as error:
+        raise ParameterError(
+            f'--namespace {namespace!r} cannot be one: letters, digits, _ and /'
+        ) from error
+    try:
+        yield node
+    finally:
+        node.destroy_node()
