@@ -116,6 +116,9 @@ def check_overrides(nodes: list[Node]) -> None:
 
 def check_sections(args: Sequence[str], namespace: str) -> list[str]:
     """Refuse parameters for nodes that there cannot be; a line for each section of another rig."""
+    # What rcl understands: `-p NODE:NAME:=VALUE` with a node in no namespace, and in files
+    # `/NAMESPACE/NODE`, nested or not, where `*` stands for one name and `**` for any number of
+    # them (rcl_yaml_param_parser, and the matching of rclcpp and rclpy).
     # A file may serve several processes and rigs, so that a section need not be for a node of this
     # process, but for one of this project.
     renamed = [rule.partition('__node:=')[2] for rule in _values_of(args, ('-r', '--remap'))]

@@ -1,4 +1,8 @@
-"""How a topic is taken for a recording: its class, the QoS that is asked for, what was offered."""
+"""How a topic is taken for a recording: its class, the QoS that is asked for, what was offered.
+
+The wheels of `rclpy` come without `tf2_msgs`, and without ``/tf`` few viewers draw a robot: where
+no installed package defines `tf2_msgs/msg/TFMessage`, it is on the wire as bytes all the same.
+"""
 
 import ctypes
 import functools
@@ -118,6 +122,10 @@ class _Description(Structure):
 @functools.cache
 def transform_class() -> type:
     """Return a class without fields, for bytes; UnknownTypeError unless Fast DDS is in use."""
+    # rmw_fastrtps_cpp asks a type for its name and hash, by which DDS matches, and for its members,
+    # of which it makes the type object. The type support of `MarkerArray`, a sequence of messages
+    # as `TFMessage` is one, is copied and given those. What turns messages into bytes and back is
+    # still that of markers, so only bytes may be sent and heard.
     if rclpy_implementation.rclpy_get_rmw_implementation_identifier() != _RMW:
         raise UnknownTypeError(f'message type {TF_MESSAGE}: not installed')
     for kind in (MarkerArray, TransformStamped):
