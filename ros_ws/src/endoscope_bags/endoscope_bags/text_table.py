@@ -120,7 +120,7 @@ def _times(text: DelimitedText, column: Column, start_s: float) -> Stamps:
         unit = DATE if is_date(cells[0]) and not is_number(cells[0], text.decimal_comma) else 's'
     if unit not in TIME_UNITS:
         raise TableError(
-            f'{text.path}: {text.label(index)} is in {unit}: which is not a unit of time'
+            f'{text.path}: {text.label(index)} is in {unit}, which is not a unit of time'
         )
     start = round(start_s * 1e9)
     if unit == DATE:

@@ -74,7 +74,7 @@ class Framing(ABC):
 
     def _registers(self, unit: int, pdu: bytes) -> tuple[int, ...]:
         if unit != self._unit:
-            raise ReplyError(ReplyTrouble.MALFORMED, f'from unit {unit}, asked was {self._unit}')
+            raise ReplyError(ReplyTrouble.MALFORMED, f'from unit {unit} instead of {self._unit}')
         if len(pdu) == 2 and pdu[0] == self._function | 0x80:
             raise ReplyError(ReplyTrouble.REFUSED, f'Modbus exception {pdu[1]}')
         size = 2 * self._count

@@ -155,7 +155,7 @@ def set_parameters(
     kind, service = SetParametersAtomically, f'{node}/set_parameters_atomically'
     result = client.call(kind, service, _request(values), patience_s).result
     if not result.successful:
-        raise GraphRefusedError(result.reason or f'{node} refused it and says no reason')
+        raise GraphRefusedError(result.reason or f'{node} refused it without a reason')
 
 
 def _request(values: Mapping[str, Any]) -> SetParametersAtomically.Request:

@@ -221,7 +221,7 @@ def build_motors(p: DynamixelParameters, goal_timeout: float) -> DynamixelMotors
                 f'for each of {", ".join(names.MOTORS)}'
             )
     if len(set(p.servo_ids)) != len(names.MOTORS):
-        raise ParameterError("motor_driver: parameter 'servo_ids' MOTORS a servo twice")
+        raise ParameterError("motor_driver: parameter 'servo_ids' names a servo twice")
     if 0 in p.servo_directions:
         raise ParameterError("motor_driver: parameter 'servo_directions' is 0; give 1 or -1")
     if p.baud not in BAUD_CODES.values():
