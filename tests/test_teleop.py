@@ -277,5 +277,5 @@ def test_without_a_terminal_it_says_so():
     )
     assert process.returncode == 2
     assert process.stderr.splitlines() == [
-        'endoscope: teleop needs a terminal, and stdin is none: a held key is its dead-man'
+        'endoscope: teleop needs a terminal, and stdin is not one: a held key is its dead-man'
     ]
