@@ -15,25 +15,15 @@ class NoLoopError(EndoscopeError, ValueError):
 
 
 def width_at_mid_height(desired: ArrayLike, actual: ArrayLike) -> float:
-    """Width of the hysteresis loop at the middle of its height.
+    """Width of the hysteresis loop at the middle of its height, in the unit of `desired`.
 
     The loop is cut half-way between the least and the greatest actual angle; its width is the mean
     desired angle at which the actual angle rises through that level, less the one at which it falls
-    through it. Positive where the actual angle lags. With several loops the mean is taken; noise
-    that crosses the level to and fro is averaged out because a run of crossings is weighed as one.
+    through it. Positive where the actual angle lags. Both are (N,) at the same instants, in time
+    order, over at least one whole loop, in rad or deg.
 
     NoLoopError if the actual angle does not pass its middle both upwards and downwards. ValueError
     if the shapes are wrong or a value is not finite.
-
-    Parameters
-    ----------
-    desired, actual : array_like, shape (N,)
-        Angles at the same instants, in time order, over at least one whole loop.
-
-    Returns
-    -------
-    float
-        Width in the unit of `desired`.
     """
     u = np.asarray(desired, dtype=float)
     q = np.asarray(actual, dtype=float)
@@ -86,11 +76,6 @@ def tracking_rmse(desired: ArrayLike, actual: ArrayLike) -> float:
     """Root of the mean square of ``actual - desired`` over all samples, in the unit of the input.
 
     ValueError if the shapes differ, there are no samples, or a value is not finite.
-
-    Parameters
-    ----------
-    desired, actual : array_like, same shape
-        Angles at the same instants.
     """
     a, d = np.asarray(actual, dtype=float), np.asarray(desired, dtype=float)
     if a.shape != d.shape:

@@ -19,40 +19,23 @@ class DeadMan:
     """Is held from a grip on, for as long as signs of that grip keep coming; all else lets go.
 
     Each time that the operator takes hold is a grip with a number of its own, larger than all
-    before.  A grip that has ended, or that was begun while something forbade it, never holds again,
-    however many signs of it come: the operator has to let go and take hold anew.
+    before. A grip that has ended, or that was begun while something forbade it, never holds again,
+    however many signs of it come: the operator has to let go and take hold again.
 
-    Every time is steady and in ns.  Call :meth:`hear` for each sign of the operator and
-    :meth:`turn` at each turn of the loop.
-
-    Attributes
-    ----------
-    held
-        Whether it was held at the last turn.
-    reason
-        Why it is not held; empty while it is.
+    Every time is steady and in ns. Call :meth:`hear` for each sign of the operator and :meth:`turn`
+    at each turn of the loop.
     """
 
     def __init__(self) -> None:
         self.held = False
-        self.reason = NEVER_HELD
+        self.reason = NEVER_HELD  # why it is not held; empty while it is
         self._grip = 0
         self._spent = 0
         self._until_ns = 0
         self._turned_ns: int | None = None
 
     def hear(self, now_ns: int, grip: int, lasts_ns: int) -> None:
-        """Take a sign of the operator.
-
-        Parameters
-        ----------
-        now_ns
-            When it came.
-        grip
-            Number of the grip; 0 for a hand that has let go.
-        lasts_ns
-            Within what time the next sign has to come.
-        """
+        """Take a sign of a grip, 0 for a hand that let go; the next is due within `lasts_ns`."""
         if self.held and now_ns > self._until_ns:
             # Between two turns; whoever fell silent has ended his grip.
             self.let_go(SILENT)
@@ -62,20 +45,7 @@ class DeadMan:
         self._until_ns = now_ns + lasts_ns
 
     def turn(self, now_ns: int, hindrance: str = '') -> bool:
-        """Judge.
-
-        Parameters
-        ----------
-        now_ns
-            Now.
-        hindrance
-            What forbids motion; empty for nothing.
-
-        Returns
-        -------
-        bool
-            Whether it is held.
-        """
+        """Whether it is held now; `hindrance` says what forbids motion, empty for nothing."""
         late = self._turned_ns is not None and now_ns - self._turned_ns > STALL_NS
         self._turned_ns = now_ns
         if late:

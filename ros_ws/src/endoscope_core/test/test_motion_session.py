@@ -54,7 +54,7 @@ def test_a_session_that_was_left_is_not_entered_again():
     session.leave('no handle')
     assert not session.hear('session-2', 50 * MS)
     assert session.name == ''
-    assert 'no handle; give enable anew' in session.trouble
+    assert 'no handle; give enable again' in session.trouble
     assert session.hear('session-3', 100 * MS)
 
 

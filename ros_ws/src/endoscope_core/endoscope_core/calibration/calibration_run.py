@@ -37,24 +37,10 @@ class CalibrationRun:
     """Commands a calibration tick by tick and collects the tensions that belong to it.
 
     The motors return to zero first, so that every calibration starts from pretension (first paper,
-    section 2.2), and rest there a moment; then all joints follow the calibration motion.
-
-    Parameters
-    ----------
-    start
-        Joint-equivalent motor angles now, in rad, shape (J,).
-    wires
-        Number of wires W whose tension is collected.
-    tick_ns
-        Control period in ns.
-    return_speed
-        Largest speed on the way to zero in rad/s.
-    rest
-        Rest at zero before the motion in s.
-    homing
-        Whether to end after the return to zero.
-    motion
-        The calibration motion; the first paper's sinusoid if not given.
+    section 2.2), and rest there a moment; then all joints follow the calibration motion, by default
+    the first paper's sinusoid. `start` are the joint-equivalent motor angles now (J,) in rad,
+    `wires` how many tensions are collected, `return_speed` the largest speed in rad/s on the way to
+    zero, `rest` the s at zero before the motion; with `homing` it ends there.
     """
 
     def __init__(

@@ -31,22 +31,10 @@ class TensionGapError(EndoscopeError, ValueError):
 
 
 class TensionRecord:
-    """Tensions of W wires from a start time on, resampled to N equally spaced instants.
+    """Tensions of W wires from `start_ns` on, resampled to N `samples`, `period_ns` apart.
 
     The readings come when the line carries them: their rate is known from their stamps alone, and
-    any from 100 Hz on will do.  Between two readings the tension is taken for a straight line.  The
-    classifier is trained with readings joined so: over 10 ms a straight line misses the tension by
-    less than one reading's noise all but where a wire turns from pulling to paying out, and a
-    filter that takes noise away takes the turning of the loop with it.
-
-    Parameters
-    ----------
-    wires
-        Number of wires W.
-    start_ns, period_ns, samples
-        The grid: stamp of the first instant and distance of the instants in ns, and their number N.
-    longest_gap_ns
-        Longest time between readings that is bridged.
+    any from 100 Hz on will do. Gaps of up to `longest_gap_ns` are bridged.
     """
 
     def __init__(
@@ -86,15 +74,14 @@ class TensionRecord:
         return self.start_ns + (self._samples - 1) * self._period_ns
 
     def resampled(self) -> Array:
-        """Tensions at the instants of the grid by linear interpolation.
+        """Tensions (N, W) in N at the instants of the grid, by linear interpolation.
 
-        TensionGapError where a gap is too long, or the readings are too far apart.
-
-        Returns
-        -------
-        ndarray, shape (N, W)
-            In N.
+        TensionGapError if a gap is too long, or the readings are too far apart.
         """
+        # Between two readings the tension is taken for a straight line, and the classifier is
+        # trained with readings joined so: over 10 ms it misses the tension by less than one
+        # reading's noise all but where a wire turns from pulling to paying out, and a filter that
+        # takes noise away takes the turning of the loop with it.
         since = self._stamps[: self._count] - self.start_ns
         intervals = self._intervals()
         longest = int(np.argmax(intervals))
@@ -129,13 +116,7 @@ class TensionRecord:
 
 
 class BendingRecord:
-    """Collects measured bending angles and compares them with the calibration sinusoid.
-
-    Parameters
-    ----------
-    joints
-        Number of joints J.
-    """
+    """Collects measured bending angles (J,) and compares them with the calibration sinusoid."""
 
     def __init__(self, joints: int) -> None:
         self._joints = joints
@@ -148,17 +129,9 @@ class BendingRecord:
         self._angles.append(angle)
 
     def backlash_size(self, start_ns: int) -> float | None:
-        """Mean backlash size of the joints in the last whole period of the sinusoid.
+        """Mean backlash size (rad) of the joints in the last whole period of a sinusoid.
 
-        Parameters
-        ----------
-        start_ns
-            Stamp at which the sinusoid began.
-
-        Returns
-        -------
-        float or None
-            In rad; None where the readings do not cover the period or show no loop.
+        It began at `start_ns`. None where the readings do not cover the period or show no loop.
         """
         signal = calibration_sinusoid()
         begin, end = signal.steady
@@ -177,17 +150,10 @@ class BendingRecord:
 
 
 def zero_errors(tension: Array) -> Array:
-    """What cells read in N where their wires hang loose, shape (W,).
-
-    At the ends of a calibration motion one wire of a joint pulls and the other is paid out until it
-    is slack, for a fifth of the time in the median of simulated tubes. The least mean over 50 ms is
-    then the zero, which noise hardly moves.
-
-    Parameters
-    ----------
-    tension : ndarray, shape (N, W)
-        N at 1 kHz, of a whole calibration.
-    """
+    """What cells read in N where their wires hang loose (W,), in a calibration (N, W) at 1 kHz."""
+    # At the ends of a calibration motion one wire of a joint pulls and the other is paid out until
+    # it is slack, for a fifth of the time in the median of simulated tubes. The least mean over
+    # 50 ms is then the zero, which noise hardly moves.
     sums = np.cumsum(tension, axis=0)
     least: Array = ((sums[_WINDOW:] - sums[:-_WINDOW]) / _WINDOW).min(axis=0)
     return least

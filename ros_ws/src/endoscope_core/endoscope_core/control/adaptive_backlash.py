@@ -159,13 +159,7 @@ class AdaptiveBacklashJoint:
 class AdaptiveBacklashController(TrackerFeedback[AdaptiveBacklashJoint]):
     """Adaptive backlash law of the second paper (section 2.4) on every joint.
 
-    Parameters
-    ----------
-    joints : int
-        Number of joints.
-    settings : AdaptiveBacklashSettings, optional
-    stale_after, fade_time : float
-        s; see `TrackerFeedback`.
+    `stale_after` and `fade_time` in s: see `TrackerFeedback`.
     """
 
     def __init__(

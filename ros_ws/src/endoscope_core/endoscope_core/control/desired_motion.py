@@ -65,13 +65,8 @@ class DesiredMotion:
 
     Angles are those of the messages but for a play of one count either way. A velocity is the
     message's where it and the one before agree with the way between their positions (`AGREEMENT`),
-    for some messages in a row (`AGREEING`); elsewhere it is estimated from the positions,
-    ``2 / BANDWIDTH`` = 33 ms late.
-
-    Parameters
-    ----------
-    joints : int
-        Number of joints.
+    for some messages in a row (`AGREEING`); elsewhere it is estimated from the positions, ``2 /
+    BANDWIDTH`` = 33 ms late.
     """
 
     def __init__(self, joints: int) -> None:
@@ -85,24 +80,10 @@ class DesiredMotion:
     def follow(
         self, position: Sequence[float], velocity: Sequence[float], dt: float
     ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Angles and velocities for a message.
+        """Angles and velocities (J,), rad and rad/s, for a message `dt` s after the one before.
 
-        ValueError if an input has another size or is not finite, or `dt` is not positive; nothing
-        changes then.
-
-        Parameters
-        ----------
-        position : sequence of float, shape (J,)
-            rad.
-        velocity : sequence of float, shape (J,) or (0,)
-            rad/s; empty where the message has none.
-        dt : float
-            s since the message before, positive; the first after a restart takes no notice of it.
-
-        Returns
-        -------
-        angles, velocities : tuple of float, shape (J,)
-            rad and rad/s.
+        `velocity` is empty where the message has none. ValueError if an input has another size or
+        is not finite, or `dt` is not positive; nothing changes then.
         """
         said: Sequence[float | None] = velocity if len(velocity) else [None] * self._count
         numbers = [*position, *velocity]

@@ -199,12 +199,6 @@ class Feedforward:
     The difference between what the old law put out and what the new one wants becomes an offset
     that is worked off while the desired angle moves. The command's speed is at most `speed_limit`
     in every mode.
-
-    Parameters
-    ----------
-    joints : int
-        Number of joints.
-    settings : FeedforwardSettings, optional
     """
 
     def __init__(self, joints: int, settings: FeedforwardSettings | None = None) -> None:
@@ -252,15 +246,8 @@ class Feedforward:
     def rebase(self, command: Vector, desired: Vector | None = None) -> None:
         """Go on from this command (J,) in rad, sent by someone else meanwhile, without a jump.
 
+        `desired` (J,) in rad is where a new stream begins, at rest; by default the stream goes on.
         ValueError if an angle has another size or is not finite.
-
-        Parameters
-        ----------
-        command
-            rad, shape (J,).
-        desired
-            Desired angle in rad, shape (J,), that a new stream begins at, at rest; by default the
-            stream goes on.
         """
         start = self._checked('command', command)
         if desired is not None:
@@ -278,22 +265,10 @@ class Feedforward:
             joint.offset = angle - joint.wanted
 
     def step(self, desired: Vector, velocity: Vector, dt: float) -> NDArray[np.float64]:
-        """Command for the desired angle.
+        """Joint-equivalent command (J,) in rad for a desired angle and velocity, rad and rad/s.
 
-        ValueError if an input has another size or is not finite, or `dt` is not positive; nothing
-        changes then.
-
-        Parameters
-        ----------
-        desired, velocity : sequence of float, shape (J,)
-            Desired angle and velocity, rad and rad/s.
-        dt : float
-            s since the last step, positive.
-
-        Returns
-        -------
-        ndarray, shape (J,)
-            Joint-equivalent motor angle in rad, without any feedback correction.
+        `dt` is the time in s since the last step. ValueError if an input has another size or is not
+        finite, or `dt` is not positive; nothing changes then.
         """
         angles = self._checked('desired', desired)
         speeds = self._checked('velocity', velocity)

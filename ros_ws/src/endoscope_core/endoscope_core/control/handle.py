@@ -63,23 +63,9 @@ class Handle:
     and 53 ms with one of 50 Hz. Nothing is extrapolated: while a sample is late the hand counts as
     standing still.
 
-    While engaged, ``slave = anchor + scale (handle - handle at engagement)`` within the limits, the
-    anchor being the slave's measured pose.
-
-    Parameters
-    ----------
-    low, high : sequence of float, shape (J,)
-        Where the slave is held back, in rad.
-    scale : float
-        Slave motion for one radian of handle motion; a change counts from the next engagement.
-    settings : HandleSettings, optional
-
-    Attributes
-    ----------
-    refused : dict of HandleRefusal to int
-        Samples that were not taken.
-    last_reason : str
-        The last of them in words.
+    While engaged, ``slave = anchor + scale (handle - handle at engagement)`` within `low` and
+    `high` (J,) in rad, the anchor being the slave's measured pose. A change of `scale` counts from
+    the next engagement.
     """
 
     def __init__(
@@ -91,7 +77,7 @@ class Handle:
     ) -> None:
         self.scale = scale
         self.settings = settings or HandleSettings()
-        self.refused = dict.fromkeys(HandleRefusal, 0)
+        self.refused = dict.fromkeys(HandleRefusal, 0)  # samples that were not taken
         self.last_reason = ''
         self._limits = tuple(zip(low, high, strict=True))
         self._timeout_ns = round(self.settings.timeout / _NS)
@@ -135,21 +121,10 @@ class Handle:
     def take(
         self, stamp_ns: int, position: Sequence[float], received_ns: int
     ) -> HandleRefusal | None:
-        """Take a sample.
+        """Take a sample (J,) in rad, or say why it is refused and counted.
 
-        Parameters
-        ----------
-        stamp_ns : int
-            When it was taken, in ns on the handle's own clock, which may have any offset.
-        position : sequence of float, shape (J,)
-            rad.
-        received_ns : int
-            Local monotonic time of receipt in ns.
-
-        Returns
-        -------
-        HandleRefusal or None
-            Why it was refused and counted, None if it was taken.
+        `stamp_ns` is on the handle's own clock, which may have any offset; `received_ns` is local
+        monotonic time.
         """
         if len(position) != len(self._limits):
             return self.refuse(HandleRefusal.MALFORMED, f'{len(position)} positions')
@@ -203,18 +178,11 @@ class Handle:
         self.release()
 
     def engage(self, slave: Sequence[float]) -> None:
-        """Begin to follow from where the slave is and the handle, as far as it was followed, was.
+        """Begin to follow from the slave's measured pose (J,) in rad.
 
         What the hand did within the lag before is followed, too: a hand that moves while it engages
-        is not stopped short.
-
-        RuntimeError where no sample of the handle has been taken. ValueError if the pose has
-        another size or is not finite.
-
-        Parameters
-        ----------
-        slave : sequence of float, shape (J,)
-            Measured pose of the slave in rad.
+        is not stopped short. RuntimeError if no sample of the handle has been taken, ValueError if
+        the pose has another size or is not finite.
         """
         if not self._smooth:
             raise RuntimeError('the handle has not been heard: nothing can be engaged')
@@ -230,21 +198,10 @@ class Handle:
         self._anchor = None
 
     def follow(self, now_ns: int) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
-        """Where the slave shall be.
+        """Position and velocity of the slave (J,), rad and rad/s, at a local monotonic time in ns.
 
-        To be called at every tick, whether engaged or not. A handle that has been silent for longer
-        than the time-out is released.
-
-        Parameters
-        ----------
-        now_ns : int
-            Local monotonic time in ns.
-
-        Returns
-        -------
-        tuple or None
-            Position and velocity of the slave in rad and rad/s, shape (J,) each; None while the
-            slave does not follow.
+        To be called at every tick, whether engaged or not; None while the slave does not follow. A
+        handle that has been silent for longer than the time-out is released.
         """
         if not self.alive(now_ns):
             self.release()

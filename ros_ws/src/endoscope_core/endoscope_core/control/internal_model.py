@@ -354,20 +354,14 @@ def keep_within(
 
 
 def reach(joint: JointParameters, limits: MotorLimits | None = None) -> Reach:
-    """Find how far a joint can be bent to and fro, time and again.
+    """Find how far a joint can be bent to and fro, in rad, time and again.
 
-    The motor swings slowly as far as its travel and the wires' tension allow. A first pull from
-    rest gets elsewhere than later ones, which begin in wires that friction has left tense.
-
-    Parameters
-    ----------
-    joint : JointParameters
-        With the friction of the tube at hand.
-    limits : MotorLimits, optional
-        Those of the shipped rig if not given.
+    The motor swings slowly as far as its travel and the wires' tension allow, by default those of
+    the shipped rig.
     """
     model = InternalModel(joint, limits or shipped_limits())
     there_and_back = [_BEYOND, -_BEYOND] * 2
+    # A first pull from rest gets elsewhere than later ones, which begin in wires left tense.
     model.go_through(there_and_back)
     low = model.angle
     model.go_through([*there_and_back, _BEYOND])

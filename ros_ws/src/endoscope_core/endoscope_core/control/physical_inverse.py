@@ -16,25 +16,8 @@ class PhysicalInverse:
     """Turns the shaft of an internal model so that its joint moves as desired, and says how.
 
     The model follows what is wanted, not what went out: an offset that someone adds to the command
-    must not be taken back as an error of the joint.
-
-    At a reversal the joint stands still until the front of the turning motor has come through the
-    sheath; that dead zone is crossed as fast as the motor can. So that noise at rest does not cross
-    it to and fro, the model turns back only when the desired angle has come back by `dead_band`.
-
-    Parameters
-    ----------
-    parameters : PhysicalParameters
-        Of the plant, identified or of the tube's class.
-    limits : MotorLimits, optional
-        Those of the shipped rig if not given.
-    dead_band : float
-        Rad; two counts of an encoder.
-
-    Attributes
-    ----------
-    shafts : tuple of float
-        Turning points of the shaft until parameters were last taken over, rad.
+    must not be taken back as an error of the joint. `limits` are by default those of the shipped
+    rig, `dead_band` is in rad.
     """
 
     def __init__(
@@ -50,6 +33,7 @@ class PhysicalInverse:
         self._turns = TurningPoints([0.0])
         self._way = 0.0
         self._arrived = True
+        # Turning points of the shaft until parameters were last taken over, rad.
         self.shafts: tuple[float, ...] = (0.0,)
 
     @property
@@ -90,6 +74,9 @@ class PhysicalInverse:
         """Command (rad) for a desired angle (rad) and velocity (rad/s) `dt` s after the last."""
         target = desired + self.servo_lag * velocity
         missing = target - self.model.angle
+        # At a reversal the joint stands still until the front of the turning motor has come through
+        # the sheath; that dead zone is crossed as fast as the motor can. So that noise at rest does
+        # not cross it to and fro, the model turns back only once `dead_band` is passed.
         if missing * self._way <= 0.0 and abs(missing) <= self._dead_band:
             self.model.turn(self.model.shaft, dt)
         else:
@@ -110,19 +97,11 @@ class PhysicalInverse:
 
 
 class AdaptivePhysicalInverse(PhysicalInverse):
-    """A `PhysicalInverse` whose parameters follow the tracker.
+    """A `PhysicalInverse` whose parameters follow the tracker; angles in rad.
 
     Feedback enters through the parameters alone: a command is always the inverse of one plant, so
     that delay and noise of the tracker cannot close a fast loop. Without a tracker it goes on with
     what was learnt.
-
-    Parameters
-    ----------
-    parameters : PhysicalParameters
-        To begin with.
-    limits : MotorLimits, optional
-    dead_band : float
-    learning : PlantLearningSettings, optional
     """
 
     def __init__(

@@ -66,31 +66,8 @@ class PlantLearning:
     """Recursive prediction-error estimator of one joint (Ljung 1999, section 11.4).
 
     A model of the plant behind its servo predicts the tip; copies with one parameter moved by 2 %
-    each give the sensitivities; the update is that of recursive least squares with a prior and a
-    random walk of the capstan exponent instead of forgetting, so that what motion does not excite
-    is kept. With every notable change of the estimates all copies go through the shaft's turning
-    points again, so that each is where its plant would be by now. After several surprises in a row
-    the exponent's variance is set to a large one (covariance resetting, Goodwin and Sin 1984,
-    section 3.3): the tube has been bent.
-
-    Parameters
-    ----------
-    parameters : PhysicalParameters
-        To begin with.
-    gear : float
-        Shaft angle for one radian of a command.
-    shafts : sequence of float
-        Turning points of the shaft so far, from rest at zero to where it is, rad.
-    settings : PlantLearningSettings, optional
-
-    Attributes
-    ----------
-    parameters : PhysicalParameters
-        As estimated.
-    modelled : PhysicalParameters
-        As last set up in the models, which follow the estimates by notable steps.
-    resets : int
-        How often the tube was taken to have changed.
+    each give the sensitivities. `gear` is the shaft angle for one radian of a command, `shafts` are
+    the turning points in rad of the shaft so far, from rest at zero to where it is.
     """
 
     _STEP = 0.02
@@ -105,8 +82,8 @@ class PlantLearning:
         settings: PlantLearningSettings | None = None,
     ) -> None:
         self.settings = settings or PlantLearningSettings()
-        self.parameters = parameters
-        self.resets = 0
+        self.parameters = parameters  # as estimated
+        self.resets = 0  # how often the tube was taken to have changed
         self._first = parameters
         self._names = tuple(LEARNT)
         self._logs = np.zeros(len(LEARNT))
@@ -121,6 +98,7 @@ class PlantLearning:
         self._nominal = packed[self._places]
         self._models = rest_state(self._packed, self._on, TICK)
         self._inputs = np.zeros(INPUTS)
+        # As last set up in the models, which follow the estimates by notable steps.
         self.modelled = parameters
         self._modelled_logs = self._logs
         self._go_through_turns()
@@ -160,6 +138,8 @@ class PlantLearning:
         found = self._at(time)
         if found is None or time <= self._last:
             return self.parameters
+        # Recursive least squares with a prior, and a random walk of the capstan exponent instead of
+        # forgetting, so that what motion does not excite is kept.
         elapsed = min(1.0, time - self._last)
         self._last = time
         tips, speed = found
@@ -195,6 +175,7 @@ class PlantLearning:
             self.resets += 1
             self._last_reset = self._time
             self._unexplained = 1.0
+            # Covariance resetting (Goodwin and Sin 1984, section 3.3): the tube has been bent.
             self.covariance[0, :] = self.covariance[:, 0] = 0.0
             self.covariance[0, 0] = _BENT_ANEW**2
 
@@ -220,6 +201,7 @@ class PlantLearning:
         self.parameters = PhysicalParameters(self._scaled(self._logs))
         if np.max(np.abs(self._logs - self._modelled_logs)) < NOTABLE:
             return
+        # All copies go through the shaft's turning points again, to where their plants would be.
         self.modelled, self._modelled_logs = self.parameters, self._logs
         self._go_through_turns()
 

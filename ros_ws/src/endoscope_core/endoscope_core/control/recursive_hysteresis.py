@@ -108,13 +108,7 @@ class RecursiveHysteresisJoint:
 class RecursiveHysteresisController(TrackerFeedback[RecursiveHysteresisJoint]):
     """Recursive least squares on every joint.
 
-    Parameters
-    ----------
-    joints : int
-        Number of joints.
-    settings : RecursiveHysteresisSettings, optional
-    stale_after, fade_time : float
-        s; see `TrackerFeedback`.
+    `stale_after` and `fade_time` in s: see `TrackerFeedback`.
     """
 
     def __init__(

@@ -115,25 +115,14 @@ class TrackerFeedback[Law: JointLaw]:
 
     The correction is to be added to the joint-equivalent feed-forward command. A measurement is
     compared with what was desired at its own stamp, so that a late tracker is no error. While the
-    tracker is stale the laws stand still and the correction fades out; it fades in again, with what
-    was learnt, once measurements return, of which the first only begins a new count of time.
+    tracker has been silent for `stale_after` s the laws stand still and the correction fades out,
+    in `fade_time` s at least; it fades in again, with what was learnt, once measurements return, of
+    which the first only begins a new count of time.
 
     Nothing moves of its own accord. While a desired angle rests its law rests and its correction
     stays what it is, whether measurements come, are lost or return. When it moves, whatever fades
     or was learnt moves the correction by no more than half as far (`SHARE_OF_TRAVEL`), and no
     faster than `RATE` and `fade_time` allow.
-
-    Parameters
-    ----------
-    joints : int
-        Number of joints.
-    timing : FeedbackTiming
-    new_law : callable
-        Makes the law of one joint, with nothing learnt.
-    stale_after : float
-        s without a measurement after which the tracker counts as lost.
-    fade_time : float
-        Least time in s from no to full weight of the correction and back.
     """
 
     def __init__(
@@ -209,25 +198,12 @@ class TrackerFeedback[Law: JointLaw]:
         velocity: Vector,
         measurement: TrackerMeasurement | None = None,
     ) -> NDArray[np.float64]:
-        """Correction for this instant.
+        """Correction (J,) in rad, at most `output_limit`, at a time in s later than the last.
 
-        ValueError if time does not advance or an input has another size or is not finite; nothing
-        changes then.
-
-        Parameters
-        ----------
-        time : float
-            s, later than at the step before.
-        desired, velocity : sequence of float, shape (J,)
-            Desired angle and velocity, rad and rad/s.
-        measurement : TrackerMeasurement, optional
-            One that has arrived since the step before. One that is older than the last, from the
-            future, or not finite is refused and counted in `refused`.
-
-        Returns
-        -------
-        ndarray, shape (J,)
-            rad to be added to the joint-equivalent command; at most `output_limit`.
+        `desired` and `velocity` (J,) are in rad and rad/s; `measurement` has arrived since the step
+        before. One that is older than the last, from the future, or not finite is refused and
+        counted in `refused`. ValueError if time does not advance or an input has another size or is
+        not finite; nothing changes then.
         """
         angle = self._checked('desired', desired)
         speed = self._checked('velocity', velocity)

@@ -51,21 +51,7 @@ class CalibrationRecording:
 def record_calibration(
     plant: PlantDescription, seed: int, motion: CalibrationMotion | None = None
 ) -> CalibrationRecording:
-    """Simulate the calibration of both joints and read it through noisy sensors.
-
-    Both joints move at once: the four tensions of the tube then come within one 9 s recording, as
-    the paper's 11 s for the whole calibration ask; one joint after the other would take 18 s or
-    leave each less than a period. Nothing couples the joints, so that neither is disturbed.
-
-    Parameters
-    ----------
-    plant : PlantDescription
-        With two joints.
-    seed : int
-        Of the sensor noise.
-    motion : CalibrationMotion, optional
-        The first paper's sinusoid if not given.
-    """
+    """Simulate the calibration of both joints, by default the sinusoid, read by noisy sensors."""
     motion = motion or calibration_motion()
     trajectory = simulate(plant, calibration_command(plant, motion))
     sensors = SensorModel(plant.sensors, seed)
@@ -126,25 +112,13 @@ def make_dataset(
 ) -> CalibrationDataset:
     """Simulate the data set; each recording is of another tube.
 
-    DatasetError if `per_class` is not positive or `seed` is negative, or the pretension is to be
-    reset of instruments of which each is another anyway. UnknownCalibrationError if there is no
-    motion of that name.
+    The same seed gives the same recordings, and more of them with a greater `per_class`. Rigs,
+    tubes and sizes do not depend on the `motion` that is recorded: the size is always that under
+    the sinusoid. All recordings may be of `one_instrument`, as mounted, whose pretension may be set
+    by hand before each. `progress` is called with the number of recordings done and to be done.
 
-    Parameters
-    ----------
-    seed : int
-        The same seed gives the same recordings, and more of them with a greater `per_class`.
-    per_class : int
-        Recordings of each class.
-    progress : callable, optional
-        Called with the number of recordings done and to be done.
-    motion : str
-        Calibration motion that is recorded. Rigs, tubes and sizes do not depend on it: the size
-        is always that under the sinusoid.
-    one_instrument : bool
-        Whether all recordings are of one instrument, as mounted, rather than each of another.
-    reset_pretension : bool
-        Whether its pretension is set by hand before each recording.
+    EndoscopeError if `per_class` is not positive or `seed` is negative, if the pretension is to be
+    reset of instruments of which each is another anyway, or if there is no motion of that name.
     """
     calibration = calibration_motion(motion)
     if per_class < 1 or seed < 0:

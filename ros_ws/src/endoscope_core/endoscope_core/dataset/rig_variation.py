@@ -145,11 +145,8 @@ def configuration_of_size(
 ) -> TubeConfiguration | None:
     """Bend the tube until the mean backlash size of both joints is `size` (rad).
 
-    Returns
-    -------
-    TubeConfiguration or None
-        None where the straight tube gives this instrument a greater size, or the most bent one a
-        smaller one or no loop at all, because friction holds the joint.
+    None where the straight tube gives this instrument a greater size, or the most bent one a
+    smaller one or no loop at all, because friction holds the joint.
     """
 
     def excess(bend: float) -> float:

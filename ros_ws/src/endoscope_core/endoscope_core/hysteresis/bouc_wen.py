@@ -232,21 +232,7 @@ class BoucWenParameters(NamedNumbers, ConstantLag):
     def from_shape(
         cls, alpha: float, lag: float, travel: float, rho: float, n: float
     ) -> BoucWenParameters:
-        """Parameters with A = 1 from quantities that can be pictured.
-
-        Parameters
-        ----------
-        alpha : float
-            Ratio of actual to driving angle.
-        lag : float
-            Half the width of a saturated loop along the actual angle, rad.
-        travel : float
-            Distance over which the hysteresis builds up, rad.
-        rho : float
-            In (-1, 1]; 1 means C = 0.
-        n : float
-            Sharpness.
-        """
+        """Parameters with A = 1 from half-width `lag` and rise `travel` of a loop, both in rad."""
         total = travel ** (-n)
         return cls(
             alpha=alpha,

@@ -55,22 +55,8 @@ def identify_classes(
 ) -> list[ClassIdentification]:
     """Model and feed-forward of every class, from all its recordings and both joints at once.
 
-    ClassParameterError if the model is unknown.
-
-    Parameters
-    ----------
-    dataset : CalibrationDataset
-        Recordings of all classes.
-    lead : float
-        s, of the compensator.
-    seed : int
-        Of the searches.
-    recordings_per_class : int
-        Use no more than this many of each class.
-    progress : callable, optional
-        Called with a line for each class.
-    model : str
-        One of `KINDS`.
+    `lead` in s is the compensator's, `model` one of `KINDS`; no more than `recordings_per_class`
+    are used, and `progress` is called with a line for each class.
     """
     if model not in KINDS:
         raise ClassParameterError(f'unknown model {model!r}: choose one of {", ".join(KINDS)}')
@@ -163,17 +149,9 @@ def class_parameter_sets(
 def load_class_parameters(
     path: str | Path | None = None, model: str = 'bouc_wen'
 ) -> dict[int, LawParameters]:
-    """Feed-forward parameters by class (backlash size in deg).
+    """Feed-forward parameters of a model by class (backlash size in deg); the shipped by default.
 
-    ClassParameterError if the file is missing, holds something else or another model, or unsafe
-    parameters.
-
-    Parameters
-    ----------
-    path : path, optional
-        A file of `endoscope identify DATASET`; the sets that come with this package if not given.
-    model : str
-        Which model's sets are wanted.
+    FileError if the file is missing, holds something else or another model, or unsafe parameters.
     """
     path = shipped_table_path(model) if path is None else Path(path)
     if not path.is_file():

@@ -179,19 +179,7 @@ def fit_feedforward(
 ) -> FeedforwardFit:
     """Choose the parameters of the inverse for the least tracking error on an identified model.
 
-    The search (differential evolution, as for the model) runs over the box of `candidates_for`, in
-    which every point is safe.
-
-    Parameters
-    ----------
-    model : HysteresisParameters
-        Of the transmission, from `fit_model`.
-    servo : Servo
-        Between command and motor.
-    lead : float
-        s, of the compensator (`FeedforwardSettings.lead`).
-    seed : int
-        Of the search.
+    The servo is between command and motor; `lead` in s is the compensator's.
     """
     cases = [_Case.of(signal, lead) for signal in design_motions()]
 

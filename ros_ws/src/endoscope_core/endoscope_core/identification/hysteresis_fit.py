@@ -209,31 +209,12 @@ class ModelFit:
 
 
 def fit_model(recordings: Sequence[Recording], seed: int = 0, model: str = 'bouc_wen') -> ModelFit:
-    """Fit a hysteresis model to one or more recordings of the same tube or class.
-
-    For given shape (such as travel and sharpness) and initial memory, the gain, the lag and an
-    offset for each recording enter linearly and follow from bounded least squares; only the shape
-    is searched (variable projection, Golub and Pereyra 1973). The search is differential evolution
-    (Storn and Price 1997), a relative of the papers' genetic algorithm: unlike their interior-point
-    method it needs no start and does not stay in the local minima that sharpness and travel make;
-    unlike a plain genetic algorithm it has only one to six unknowns left, keeps to its box, and
-    repeats with its seed. L-BFGS-B, bounded too, then polishes. The weights of Prandtl-Ishlinskii
-    are bounded least squares over 20 fixed thresholds: convex, solved exactly, with no search.
+    """Fit a hysteresis model to one or more recordings (rad) of the same tube or class.
 
     What comes out is safe by construction: the boxes are those of the parameter classes, and where
-    the inverse would be too steep the travel is lengthened.
-
-    IdentificationError if the model is unknown, there is no recording, one is empty or not finite,
-    or the motor or the joint hardly moves.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        Of one tube or class.
-    seed : int
-        Of the search.
-    model : str
-        One of `endoscope_core.hysteresis.inverse.MODELS`.
+    the inverse would be too steep the travel is lengthened. IdentificationError if the model is
+    unknown, there is no recording, one is empty or not finite, or the motor or the joint hardly
+    moves.
     """
     _check(recordings)
     if model == 'prandtl_ishlinskii':
@@ -256,6 +237,10 @@ def fit_model(recordings: Sequence[Recording], seed: int = 0, model: str = 'bouc
     def cost(x: Array) -> float:
         return _linear_part(family, recordings, memories(x))[1]
 
+    # For given shape and initial memory, the gain, the lag and an offset for each recording enter
+    # linearly and follow from bounded least squares (variable projection, Golub and Pereyra 1973):
+    # one to six unknowns are left. Differential evolution (Storn and Price 1997) needs no start and
+    # does not stay in the local minima that sharpness and travel make; L-BFGS-B then polishes.
     found = differential_evolution(
         cost,
         [*family.shape_bounds, *[(-1.0, 1.0)] * len(starts)],

@@ -78,33 +78,21 @@ def fit_plant(
 ) -> PlantFit:
     """Fit the nominal plant of one joint to a motion from rest, sampled at 1 kHz.
 
-    The tensions at the motor hold the friction and, through it, the tip: how they rise and fall at
-    a reversal shows the exponent and the wire's stiffness, where they stop rising the joint begins
-    to move. All parameters enter through the simulation: bounded trust-region least
-    squares (Branch, Coleman and Li 1999) on their logarithms, from the best of five capstan
-    exponents. What bending the tube changes goes along the lines of the shipped family, with the
-    bend as one more unknown; about them are priors of the width that `FITTED` says. Radii and servo
-    are not fitted but the family's, or nominal where the nominal rig explains the tensions better.
-    It is deterministic; the optimum is smooth and single once the exponent is near, which a genetic
-    algorithm would find a hundred times slower.
+    The `command` (N,) in rad is joint-equivalent, `tension` (N, 2) in N that of the positive and
+    the negative wire, `bending` (N,) in rad NaN where there is none, `gear` the shaft angle for one
+    radian at the joint. The search begins at `start`, about which the priors are; by default at the
+    family and the nominal rig.
 
     PlantFitError if shapes are wrong, a command or tension is not finite, there is less than a
     second, or the command moves by less than 20 deg.
-
-    Parameters
-    ----------
-    command : array_like, shape (N,)
-        Joint-equivalent motor command in rad.
-    tension : array_like, shape (N, 2)
-        Load cells of the positive and the negative wire, N.
-    bending : array_like, shape (N,), optional
-        Bending angle in rad; NaN where there is none.
-    start : JointParameters, optional
-        Where the search begins and what the priors are about; the family and the nominal rig if
-        not given.
-    gear : float
-        Shaft angle for one radian at the joint.
     """
+    # How the tensions rise and fall at a reversal shows the exponent and the wire's stiffness;
+    # where they stop rising the joint begins to move. Bounded trust-region least squares (Branch,
+    # Coleman and Li 1999) on the parameters' logarithms, from the best of five capstan exponents:
+    # the optimum is smooth and single once the exponent is near. What bending the tube changes goes
+    # along the lines of the shipped family, with the bend as one more unknown, about them priors of
+    # the width that `FITTED` says. Radii and servo are the family's, or nominal where the nominal
+    # rig explains the tensions better.
     u, wires, angle = _checked(command, tension, bending)
     if start is not None:
         rigs = [_whatever_the_bend(start)]

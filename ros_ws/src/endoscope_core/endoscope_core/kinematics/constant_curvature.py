@@ -26,24 +26,11 @@ Quaternion = tuple[float, float, float, float]
 
 
 def tip_pose(bending: ArrayLike, length: float) -> tuple[Array, Array]:
-    """Pose of the tip in the frame of the instrument's base.
+    """Position (3,) in m and orientation (4,) x, y, z, w of the tip in the frame of the base.
 
-    ValueError where the section would bend by half a turn or more: orientation no longer tells the
+    `bending` (2,) is ``bend_x`` and ``bend_y`` in rad, `length` that of the section in m.
+    ValueError if the section would bend by half a turn or more: orientation no longer tells the
     angles.
-
-    Parameters
-    ----------
-    bending
-        ``bend_x`` and ``bend_y`` in rad, shape (2,); their norm is below pi.
-    length
-        Length of the bending section in m.
-
-    Returns
-    -------
-    position : ndarray, shape (3,)
-        In m.
-    orientation : ndarray, shape (4,)
-        Unit quaternion x, y, z, w with w > 0.
     """
     x, y = (float(v) for v in np.asarray(bending, dtype=float))
     angle = math.hypot(x, y)
@@ -63,22 +50,7 @@ def tip_pose(bending: ArrayLike, length: float) -> tuple[Array, Array]:
 
 
 def centre_line(bending: ArrayLike, length: float, points: int) -> Array:
-    """Points of the section from its base to its tip, as many and as far apart along it.
-
-    Parameters
-    ----------
-    bending
-        ``bend_x`` and ``bend_y`` in rad, shape (2,).
-    length
-        Length of the bending section in m.
-    points
-        How many, N.
-
-    Returns
-    -------
-    ndarray, shape (N, 3)
-        In m, in the frame of the instrument's base.
-    """
+    """Points (N, 3) in m along a section of `length` m from base to tip, bent (2,) in rad."""
     x, y = (float(v) for v in np.asarray(bending, dtype=float))
     share = np.linspace(0.0, 1.0, points)
     angle = math.hypot(x, y) * share
@@ -89,22 +61,10 @@ def centre_line(bending: ArrayLike, length: float, points: int) -> Array:
 
 
 def bending_from_orientation(orientation: ArrayLike) -> Array:
-    """Bending angles that give the tip its orientation; the inverse of :func:`tip_pose`.
+    """Bending angles (2,) in rad that give the tip its orientation; inverse of :func:`tip_pose`.
 
-    A rotation about the instrument's own axis, which bending does not cause, is removed first
-    (swing-twist decomposition with the twist at the base's z axis).
-
-    ValueError where the quaternion is zero or not finite, or the tip points straight back.
-
-    Parameters
-    ----------
-    orientation
-        Quaternion x, y, z, w relative to the straight instrument, shape (4,); any length but zero.
-
-    Returns
-    -------
-    ndarray, shape (2,)
-        ``bend_x`` and ``bend_y`` in rad.
+    `orientation` (4,) is a quaternion x, y, z, w relative to the straight instrument. ValueError if
+    it is zero or not finite, or the tip points straight back.
     """
     q = np.asarray(orientation, dtype=float)
     norm = float(np.linalg.norm(q))
@@ -114,7 +74,9 @@ def bending_from_orientation(orientation: ArrayLike) -> Array:
     twist = math.hypot(z, w)
     if twist < _SMALL:
         raise ValueError('the tip points straight back: the bending direction is undefined')
-    # Swing = q * conj(twist): what is left once the turn about z is taken out.
+    # A rotation about the instrument's own axis, which bending does not cause, is removed first
+    # (swing-twist decomposition). Swing = q * conj(twist): what is left once the turn about z is
+    # taken out.
     cz, cw = z / twist, w / twist
     sx = x * cw - y * cz
     sy = y * cw + x * cz
@@ -190,19 +152,9 @@ class Vertebrae:
         return tuple(hinge.name for hinge in self.hinges if hinge.axis)
 
     def joint_angles(self, bending: Sequence[float]) -> tuple[float, ...]:
-        """Angles of all joints at a bending.
+        """Angles (J,) in rad of all joints at ``bend_x`` and ``bend_y`` (2,) in rad.
 
-        ValueError where the section would bend by half a turn or more.
-
-        Parameters
-        ----------
-        bending
-            ``bend_x`` and ``bend_y`` in rad, shape (2,); their norm is below pi.
-
-        Returns
-        -------
-        tuple of float
-            In rad, shape (J,), in the order of `joint_names`.
+        ValueError if the section would bend by half a turn or more.
         """
         # Real bending sections are rows of vertebrae with crossed hinges, and so is this one: each
         # turns about its x axis and its y axis, every second one the other way round. All x hinges
@@ -221,13 +173,7 @@ class Vertebrae:
         return tuple(turn[hinge.axis] for hinge in self.hinges if hinge.axis)
 
     def transforms(self, angles: Sequence[float]) -> list[Transform]:
-        """Where every link is in the frame of the one before it.
-
-        Parameters
-        ----------
-        angles
-            Of the joints in rad, shape (J,), in the order of `joint_names`.
-        """
+        """Where every link is in the frame of the one before it, at joint angles (J,) in rad."""
         turns = iter(angles)
         found = []
         for _, parent, child, axis, height in self.hinges:

@@ -23,17 +23,9 @@ _COLOURS = {
 
 
 def robot_description(section: Vertebrae) -> str:
-    """Describe the instrument: insertion tube, bending section with its wires, and tip.
+    """Describe insertion tube, bending section with its wires, and tip as URDF; lengths in m.
 
-    Parameters
-    ----------
-    section
-        Its bending section; everything else is as large as looks right beside that.
-
-    Returns
-    -------
-    str
-        URDF, with a link for every frame of the section; lengths in m.
+    Everything but the bending section is as large as looks right beside that.
     """
     robot = Element('robot', name='endoscope')
     for name, rgba in _COLOURS.items():

@@ -45,23 +45,11 @@ class StraightRegistration:
     def in_base(
         self, position: ArrayLike, orientation: ArrayLike, *, roll: float, length: float
     ) -> tuple[Array, Array]:
-        """Pose of the tip in the frame of the instrument's base.
+        """Position (3,) in m and orientation (4,) of the tip in the frame of the instrument's base.
 
-        Parameters
-        ----------
-        position, orientation
-            Of the sensor in the tracker's frame: m, shape (3,), and x, y, z, w, shape (4,).
-        roll
-            Angle in rad from the base's x axis to the sensor's x axis about z, as it is mounted.
-        length
-            Length of the bending section in m: where the tip of the straight instrument is.
-
-        Returns
-        -------
-        position : ndarray, shape (3,)
-            In m.
-        orientation : ndarray, shape (4,)
-            Unit quaternion x, y, z, w.
+        `position` (3,) in m and `orientation` (4,) x, y, z, w are the sensor's in the tracker's
+        frame, `roll` in rad its angle about z as mounted, `length` in m where the tip of the
+        straight instrument is.
         """
         mounted = Rotation.from_rotvec((0.0, 0.0, roll))
         to_base = mounted * Rotation.from_quat(self.orientation).inv()
@@ -75,18 +63,9 @@ def register_straight(
     orientations: Sequence[ArrayLike],
     limits: StillnessLimits | None = None,
 ) -> StraightRegistration:
-    """Average readings of the straight instrument, unless it moved.
+    """Average N positions (3,) in m and orientations (4,) x, y, z, w of the straight instrument.
 
     RegistrationError if there are too few readings, or the tip was not still.
-
-    Parameters
-    ----------
-    positions
-        N positions in m, each of shape (3,).
-    orientations
-        N unit quaternions x, y, z, w, each of shape (4,).
-    limits
-        What counts as still.
     """
     limits = limits or StillnessLimits()
     count = len(positions)

@@ -159,14 +159,9 @@ class Rig:
 
 
 def load_rig(path: str | Path | None = None) -> Rig:
-    """Read a rig.yaml; what it does not say is as in the one that is shipped.
+    """Read a rig.yaml; what it does not say is as in the shipped one, which is the default.
 
-    FileError where it cannot be read, has an unknown key, or a value out of range.
-
-    Parameters
-    ----------
-    path
-        The file; the shipped one by default.
+    FileError if it cannot be read, has an unknown key, or a value out of range.
     """
     if path is None or not str(path):
         return _rig({}, 'the shipped rig')
@@ -183,16 +178,9 @@ def rig_as_text(rig: Rig) -> str:
 
 
 def rig_from_text(text: str, name: str) -> Rig:
-    """Read what `rig_as_text` wrote.
+    """Read what `rig_as_text` wrote; `name` says where it stands, for messages.
 
-    FileError where it has an unknown key, or a value out of range.
-
-    Parameters
-    ----------
-    text : str
-        YAML.
-    name : str
-        Where it stands, for messages.
+    FileError if it has an unknown key, or a value out of range.
     """
     return _rig(parse_yaml(text, name), name)
 

@@ -48,39 +48,19 @@ class CommandLimits:
 class CommandGate:
     """Obeys a stream of commands while it is complete, finite, in order, in time and in limits.
 
-    Age is measured by the receiver's monotonic clock.  The sender's clock may have any offset:
-    the smallest difference between receipt and stamp in this stream is taken for it (with 0.1 % of
-    the receiver's time for drift).  A command that took longer than that by ``max_age_ns`` is late,
-    and one that took so much less is stamped in the future.  Where the first two commands of a
-    stream do not agree, the first one's stamp is taken for the wrong one.
+    Age is measured by the receiver's monotonic clock. The sender's clock may have any offset: the
+    smallest difference between receipt and stamp in this stream is taken for it (with 0.1 % of the
+    receiver's time for drift). A command that took longer than that by ``max_age_ns`` is late, and
+    one that took so much less is stamped in the future. Where the first two commands of a stream do
+    not agree, the first one's stamp is taken for the wrong one.
 
     Once nothing has come for longer than ``max_age_ns`` the next command begins another stream and
-    tells its offset anew: clocks drift, are set, and stand while a machine sleeps.  Only a command
+    tells its offset again: clocks drift, are set, and stand while a machine sleeps. Only a command
     that is late by the offset of the last stream is not believed, and what is refused is no pause:
     a stream that is late stays late until :meth:`reset`.
 
     Speed is judged by an allowance of travel, which grows by ``max_speed`` with the receiver's time
     and is spent by every command obeyed: stamps cannot stretch it, and it can be spent only once.
-
-    Parameters
-    ----------
-    limits
-        What may be asked.
-
-    Attributes
-    ----------
-    refused
-        Number of refused commands by reason.
-    accepted
-        Number of obeyed ones.
-    due
-        Number of commands that the sender's stamps tell of, obeyed or lost on the way, in streams
-        that were obeyed: the time between their stamps by what is usual of it, a low quantile, for
-        a command that is lost makes it longer.
-    began
-        Whether the last command obeyed was the first of a stream.
-    last_reason
-        The last refusal in words.
     """
 
     def __init__(self, limits: CommandLimits) -> None:
@@ -90,9 +70,12 @@ class CommandGate:
         self._outnumbered_ns: int | None = None
         self.refused: dict[Refusal, int] = dict.fromkeys(Refusal, 0)
         self.accepted = 0
+        # Commands that the sender's stamps tell of, obeyed or lost on the way, in streams that were
+        # obeyed: the time between their stamps by what is usual of it, a low quantile, for a
+        # command that is lost makes it longer.
         self.due = 0.0
-        self.began = True
-        self.last_reason = ''
+        self.began = True  # whether the last command obeyed was the first of a stream
+        self.last_reason = ''  # the last refusal in words
         self._interval_ns = 0
         self._gaps: list[int] = []
         self._position: tuple[float, ...] = ()
@@ -149,24 +132,10 @@ class CommandGate:
         measured: Sequence[float],
         velocity: Sequence[float] = (),
     ) -> Refusal | None:
-        """Judge one command.
+        """Judge a command (J,) in rad and rad/s; why it is refused, or None if it is to be obeyed.
 
-        Parameters
-        ----------
-        stamp_ns
-            Its header stamp in ns.
-        position, velocity
-            rad and rad/s, shape (J,); ``velocity`` may be empty.
-        received_ns
-            Local monotonic time of receipt in ns.
-        measured
-            Measured position in rad, shape (J,), which the first command of a stream is compared
-            with.
-
-        Returns
-        -------
-        Refusal or None
-            Why it is refused, or None if it is to be obeyed.
+        `stamp_ns` is its header's, `received_ns` local monotonic time; `measured` (J,) in rad is
+        what the first command of a stream is compared with. `velocity` may be empty.
         """
         longest = self.limits.max_age_ns
         paused = self._heard_ns is not None and received_ns - self._heard_ns > longest

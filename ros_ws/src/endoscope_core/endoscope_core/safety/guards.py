@@ -13,21 +13,12 @@ PATIENCE_NS = 300_000_000
 
 
 class TensionGuard:
-    """Says when a wire is pulled too hard.
+    """Says when one of W wires is pulled harder than `ceiling`, in N.
 
-    A wire is over the ceiling once ``samples`` readings in a row are: a single spike of a load cell
-    is not a tension.  A reading that is not a number counts as over the ceiling, for it hides one.
-    That is over only at nine tenths of the ceiling, for readings that scatter about the ceiling are
-    still of a wire that is pulled too hard.
-
-    Parameters
-    ----------
-    names
-        The W wires.
-    ceiling
-        In N.
-    samples
-        How many readings in a row it takes, and how many below to say that it is over.
+    A wire is over the ceiling once `samples` readings in a row are: a single spike of a load cell
+    is not a tension. A reading that is not a number counts as over the ceiling, for it hides one.
+    That is over only after as many at nine tenths of the ceiling, for readings that scatter about
+    the ceiling are still of a wire that is pulled too hard.
     """
 
     def __init__(self, names: Sequence[str], ceiling: float, samples: int = 3) -> None:
@@ -40,13 +31,7 @@ class TensionGuard:
         self.trouble = ''
 
     def update(self, tension: Sequence[float]) -> str:
-        """Take one reading of all wires, in N, shape (W,).
-
-        Returns
-        -------
-        str
-            What is wrong, naming the wire; empty while all is well.
-        """
+        """Take a reading of all wires (W,) in N; what is wrong, naming the wire, or nothing."""
         high = False
         low = max(tension, default=0.0) <= RELEASE * self._ceiling
         for wire, value in enumerate(tension):
@@ -73,18 +58,12 @@ class TensionGuard:
 
 
 class StandingStill:
-    """Compares what motors are told with what they do.
+    """Compares what J motors are told with what they do.
 
-    A motor fails to answer once its goal has been further than `TOLD_RAD` from what it was when
-    the shaft came to rest, for `PATIENCE_NS`, and the shaft has not turned since.  A constant
-    difference is none: a servo under load stands beside its goal.
-
-    Parameters
-    ----------
-    names
-        Of the J motors.
-    resolution
-        One count of their encoders in rad; a shaft that turns by no more than two stands still.
+    A motor fails to answer once its goal has been further than `TOLD_RAD` from what it was when the
+    shaft came to rest, for `PATIENCE_NS`, and the shaft has not turned since by more than two
+    counts of `resolution` rad. A constant difference does not count: a servo under load stands
+    beside its goal.
     """
 
     def __init__(self, names: Sequence[str], resolution: float) -> None:
@@ -101,12 +80,9 @@ class StandingStill:
     def look(
         self, goal: Sequence[float], measured: Sequence[float] | None, measured_ns: int
     ) -> str:
-        """Take goal and shaft angles in rad, shape (J,), measured at a monotonic time in ns.
+        """Take goal and shaft angles (J,) in rad, measured at a monotonic time in ns.
 
-        Returns
-        -------
-        str
-            Which motor stands still, and how far it was told to go; empty where all answer.
+        Says which motor stands still, and how far it was told to go; empty where all answer.
         """
         if measured is None:
             self.restart()

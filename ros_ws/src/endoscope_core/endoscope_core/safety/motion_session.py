@@ -22,28 +22,15 @@ _USUAL_TURN_NS = 40_000_000
 class MotionSession:
     """One node's part in motion sessions.
 
-    Every method takes the node's steady time.  The node calls :meth:`hear` at each heartbeat of the
-    supervisor and :meth:`beat` at each turn of its own loop, and asks `name` before it moves
-    anything.
-
-    Parameters
-    ----------
-    silence_ns
-        Silence of the supervisor that ends the session.
-    stall_ns
-        Time without a turn of the node's own loop that ends the session.
-
-    Attributes
-    ----------
-    name
-        Session that the node takes part in; empty while it must not move anything.
-    trouble
-        Why the node takes no part in the session that is open; empty where it does, and where
-        none is open.
+    Every method takes the node's steady time in ns. The node calls :meth:`hear` at each heartbeat
+    of the supervisor and :meth:`beat` at each turn of its own loop, and asks `name` before it moves
+    anything. A supervisor that is silent for `silence_ns` ends the session, and so does a loop that
+    did not turn for `stall_ns`.
     """
 
     def __init__(self, silence_ns: int = SILENCE_NS, stall_ns: int = STALL_NS) -> None:
-        self.name = ''
+        self.name = ''  # session that the node takes part in; empty: it must not move anything
+        # Why the node takes no part in the open session; empty where it does or none is open.
         self.trouble = ''
         self._silence_ns = silence_ns
         self._stall_ns = stall_ns
@@ -55,21 +42,10 @@ class MotionSession:
         self._lenience_ns = _LENIENCE_NS
 
     def hear(self, name: str, now_ns: int, doubt: str = '') -> bool:
-        """Take a heartbeat of the supervisor.
+        """Take a heartbeat; whether the node enters the session it names, at the measured pose.
 
-        Parameters
-        ----------
-        name
-            Session that is open; empty where none is.
-        now_ns
-            Time of receipt in ns.
-        doubt
-            Why it may not be the supervisor's, as with two senders on its topic; ends the session.
-
-        Returns
-        -------
-        bool
-            Whether the node has entered a session: it starts from the measured pose.
+        `name` is empty where none is open. `doubt` says why the heartbeat may not be the
+        supervisor's, as with two senders on its topic, and ends the session.
         """
         if doubt:
             self.leave(doubt)
@@ -81,7 +57,9 @@ class MotionSession:
         if name == before:
             return False
         if name and before is None:
-            self.trouble = self.trouble or f'was not there when {name} was opened: give enable anew'
+            self.trouble = (
+                self.trouble or f'was not there when {name} was opened: give enable again'
+            )
             return False
         self.trouble = ''
         self.name = name
@@ -106,7 +84,7 @@ class MotionSession:
     def leave(self, reason: str) -> None:
         """End the node's part in the session; only another session lets it move again."""
         if self.name:
-            self.trouble = f'left {self.name}: {reason}; give enable anew'
+            self.trouble = f'left {self.name}: {reason}; give enable again'
             self.name = ''
 
     def belongs(self, session: str) -> bool:

@@ -57,28 +57,18 @@ class MotionLimits:
 
 
 class MotionShaper:
-    """Turns targets into a motion within the limits.
+    """Turns targets in rad into a motion within the limits.
 
     Call :meth:`shape` once for each accepted target with the time between the *stamps* of this one
     and the one before: by arrival, jitter would look like acceleration.
 
     A period longer than :attr:`MotionLimits.longest_period` is a stall: nothing was commanded
     meanwhile, so that the joint stands where it was sent last, and the motion starts from rest.
-
-    Parameters
-    ----------
-    limits
-        What the motion keeps to.
-
-    Attributes
-    ----------
-    bounded
-        Number of calls of :meth:`shape` whose target was not reached within the limits.
     """
 
     def __init__(self, limits: MotionLimits) -> None:
         self.limits = limits
-        self.bounded = 0
+        self.bounded = 0  # calls of `shape` whose target was not reached within the limits
         self._ranges = tuple(zip(limits.low, limits.high, strict=True))
         self._position: tuple[float, ...] = ()
         self._velocity: tuple[float, ...] = (0.0,) * len(self._ranges)
@@ -106,22 +96,10 @@ class MotionShaper:
         self._target = None
 
     def shape(self, target: Sequence[float], period: float) -> tuple[float, ...]:
-        """Next position on the way to a target.
+        """Next position (J,) in rad on the way to a target (J,), `period` s after the last call.
 
-        RuntimeError where there was no :meth:`restart`. ValueError if the target has another size
-        or is not finite, or the period is not positive; nothing changes then.
-
-        Parameters
-        ----------
-        target
-            rad, shape (J,).
-        period
-            s since the call before, positive.
-
-        Returns
-        -------
-        tuple of float, shape (J,)
-            rad.
+        RuntimeError if there was no :meth:`restart`, ValueError if the target has another size or
+        is not finite, or the period is not positive; nothing changes then.
         """
         goals = self._checked('target', target)
         dt = self._begin_period(period)

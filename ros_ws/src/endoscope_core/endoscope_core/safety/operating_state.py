@@ -62,24 +62,15 @@ class OperatingStateMachine:
     """The one place that decides in which state the slave is, and under which session it moves.
 
     A fault latches: it stays after its cause has gone, and only an explicit ``enable`` or
-    ``disable`` ends it; ``enable`` and ``resume`` are refused while any cause is present.  Torque
-    can be switched off in every state.  Nothing but ``enable`` and ``resume`` leads to ``ENABLED``,
+    ``disable`` ends it; ``enable`` and ``resume`` are refused while any cause is present. Torque
+    can be switched off in every state. Nothing but ``enable`` and ``resume`` leads to ``ENABLED``,
     and each time one of them does, a new motion session is opened; it ends with the state.
-
-    Attributes
-    ----------
-    state
-        The state now.
-    session
-        Name of the motion session; empty in every state but ``ENABLED``.
-    cause
-        Why it is ``FAULT``: the first cause; empty otherwise.
     """
 
     def __init__(self) -> None:
         self.state = OperatingState.DISABLED
-        self.session = ''
-        self.cause = ''
+        self.session = ''  # empty in every state but ENABLED
+        self.cause = ''  # the first cause of a FAULT, empty otherwise
         self._number = 0
         self._present: dict[str, str] = {}
 
@@ -89,15 +80,10 @@ class OperatingStateMachine:
         return dict(self._present)
 
     def command(self, text: str, now_ns: int) -> Answer:
-        """Carry out a command, or say why not.
+        """Carry out a command, one of :class:`StateCommand`, or say why not.
 
-        Parameters
-        ----------
-        text
-            One of :class:`StateCommand`; anything else is refused.
-        now_ns
-            Time in ns, of which a session takes its number: in ms, and larger than the last, so
-            that no session of this or a former supervisor is ever named again.
+        A session takes its number from `now_ns`: in ms, and larger than the last, so that no
+        session of this or a former supervisor is ever named again.
         """
         try:
             command = StateCommand(text)
@@ -126,19 +112,9 @@ class OperatingStateMachine:
         return Answer(True)
 
     def report_cause(self, name: str, description: str) -> bool:
-        """Note that a condition forbids motion; a fault if the slave may be moving.
+        """Note under a name, and in one line, what forbids motion; whether that changed the state.
 
-        Parameters
-        ----------
-        name
-            Key of the condition, for :meth:`clear_cause`.
-        description
-            One line that names the thing and what is wrong with it.
-
-        Returns
-        -------
-        bool
-            Whether the state changed.
+        It is a fault if the slave may be moving.
         """
         self._present[name] = description
         if self.state in (OperatingState.ENABLED, OperatingState.PAUSED):

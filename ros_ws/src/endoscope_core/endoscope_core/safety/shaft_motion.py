@@ -11,36 +11,18 @@ _FIRST_PERIOD_S = 1e-3
 
 
 class ShaftMotion:
-    """Gives the goal of the shafts in every tick, whatever the commands are.
+    """Gives the goal of the shafts (J,) in rad in every tick, whatever the commands are.
 
     The goal moves in three cases only: under commands of the session that the driver takes part in;
     to the position measured when those ended, within the bounds of the shaper; and, when a session
     begins, to the position measured then, which is where the shafts are.
-
-    Parameters
-    ----------
-    commands
-        What a command may ask for.
-    limits
-        What the motion keeps to.
-
-    Attributes
-    ----------
-    session
-        The driver's part in motion sessions.
-    gate
-        Judges the commands, and counts.
-    shaper
-        Bounds what they ask for.
-    holds
-        How often commands have ended and the measured position was held.
     """
 
     def __init__(self, commands: CommandLimits, limits: MotionLimits) -> None:
         self.session = MotionSession()
         self.gate = CommandGate(commands)
         self.shaper = MotionShaper(limits)
-        self.holds = 0
+        self.holds = 0  # how often commands have ended and the measured position was held
         self._entered = ''
         self._measured: tuple[float, ...] = ()
         self._held: tuple[float, ...] = ()
@@ -74,16 +56,9 @@ class ShaftMotion:
     ) -> Refusal | None:
         """Take a command, or say why not.
 
-        Parameters
-        ----------
-        session
-            Motion session that it names.
-        stamp_ns, position, velocity
-            Its stamp in ns, rad and rad/s; see `CommandGate.check`.
-        now_ns
-            Local monotonic time of receipt in ns.
-        doubt
-            Why it may not be the compensator's, as with two senders; ends the session.
+        It names its `session`; `stamp_ns`, `position` and `velocity` are as in `CommandGate.check`,
+        `now_ns` is local monotonic time. `doubt` says why it may not be the compensator's, as with
+        two senders, and ends the session.
         """
         # After a standstill a command may come before the next tick does.
         self.session.beat(now_ns)
@@ -114,15 +89,7 @@ class ShaftMotion:
         return None
 
     def turn(self, now_ns: int, period: float) -> tuple[float, ...]:
-        """Goal for this tick in rad, shape (J,); empty before the first reading.
-
-        Parameters
-        ----------
-        now_ns
-            Local monotonic time in ns.
-        period
-            s since the tick before.
-        """
+        """Goal (J,) in rad, `period` s after the last; empty before the first reading."""
         self.session.beat(now_ns)
         self._notice_session()
         if not self._goal:

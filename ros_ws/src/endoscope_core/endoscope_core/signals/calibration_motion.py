@@ -33,19 +33,13 @@ _RETURN_DURATION = 0.7
 def calibration_sinusoid() -> Signal:
     """``90 sin(t)`` deg for 9 s, begun smoothly, then brought back to rest at zero within 1 s.
 
-    The first paper (section 2.2) uses ``90 sin(omega t)`` at 0.159 Hz, which is ``omega = 1``
-    rad/s: 9 s hold 1.43 periods, so that the last 2 pi seconds are one whole settled loop (the
-    first peak, at 1.57 s, has wiped out where the motion began). 90 deg drives every class, up to
-    100 deg of backlash, out of its dead zone on both sides. The paper's signal starts with a step
-    in velocity; here its amplitude rises within the first 0.5 s, before anything that the loop
-    depends on. The 9000 samples at 1 kHz that the classifier reads are those with ``0 <= t < 9``;
-    the return to zero comes after them and keeps the whole, 10 s, below the paper's 11 s.
-
-    Returns
-    -------
-    Signal
-        Its `steady` interval is the last whole period before 9 s.
+    Its `steady` interval is the last whole period before 9 s.
     """
+    # The first paper (section 2.2) uses 0.159 Hz, 1 rad/s: 9 s hold 1.43 periods, so that the last
+    # 2 pi s are one whole settled loop (the first peak, at 1.57 s, has wiped out where the motion
+    # began). 90 deg drives every class, up to 100 deg, out of its dead zone on both sides. The
+    # paper's signal starts with a step in velocity; here its amplitude rises within 0.5 s. The
+    # return to zero keeps the whole, 10 s, below the paper's 11 s.
     end = CALIBRATION_RECORD_DURATION
     return begun_sinusoid(
         'calibration',
@@ -89,16 +83,11 @@ def begun_sinusoid(
 def brief_calibration() -> Signal:
     """``90 sin(2.5 t)`` deg for 3.14 s, begun smoothly, then brought back to zero within 0.7 s.
 
-    The record ends at the second upper peak: from the first peak to the second the loop is whole
-    and has forgotten where the motion began, which is what the first paper's 9 s hold at 1 rad/s
-    (section 3.1). Faster motion saves time at the cost of more viscous and servo lag in the
-    tensions, which a model trained on this motion has seen.
-
-    Returns
-    -------
-    Signal
-        Its `steady` interval is the last whole period of the record.
+    Its `steady` interval is the last whole period of the record.
     """
+    # The record ends at the second upper peak: from the first to the second the loop is whole and
+    # has forgotten where the motion began, as in the first paper's 9 s (section 3.1). Faster motion
+    # costs more viscous and servo lag in the tensions, which a model trained on it has seen.
     period = 2.0 * np.pi / BRIEF_FREQUENCY
     return begun_sinusoid(
         'brief calibration',

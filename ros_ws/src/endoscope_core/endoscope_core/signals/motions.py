@@ -21,26 +21,11 @@ def sum_of_sines(
     duration: float,
     ramp: float = RAMP_DURATION,
 ) -> Signal:
-    """Sum of sines whose amplitude rises from and falls to zero.
+    """Sum of sines, of amplitude (rad) and frequency (rad/s) each, begun and ended by ramps.
 
-    ValueError if `duration` leaves no steady interval.
-
-    Parameters
-    ----------
-    name : str
-        Name of the signal.
-    components : sequence of (float, float)
-        Amplitude in rad and angular frequency in rad/s of each sine.
-    duration : float
-        Length in s, ramps included.
-    ramp : float
-        Length in s of the rise and of the fall.
-
-    Returns
-    -------
-    Signal
-        Its `steady` interval leaves out both ramps and the first quarter period of the slowest
-        sine, after which the hysteresis no longer remembers how the motion began.
+    `duration` in s includes both ramps of `ramp` s. The `steady` interval leaves out the ramps and
+    the first quarter period of the slowest sine, after which the hysteresis no longer remembers how
+    the motion began; ValueError if that leaves none.
     """
     quarter = 0.5 * np.pi / min(omega for _, omega in components)
     steady = (max(ramp, quarter), duration - ramp)
@@ -160,20 +145,10 @@ def teleoperation_like(seed: int, reaches: int, reach: float, end: float = 0.0) 
 
 
 def commissioning_motion(seed: int = 1) -> Motion:
-    """Calibration sinusoid, rest, slow triangle, steps, multisine, chirp, teleoperation-like.
+    """Calibration sinusoid, rest, slow triangle, steps, multisine, chirp, teleoperation-like: 52 s.
 
     `bend_x` moves alone through the first five pieces, so that whatever appears at `bend_y` then is
-    coupling; during the last two both move.
-
-    Parameters
-    ----------
-    seed : int
-        Seed of the teleoperation-like part.
-
-    Returns
-    -------
-    Motion
-        For `bend_x` and `bend_y`, about 52 s.
+    coupling; during the last two both move. The teleoperation-like part is drawn from `seed`.
     """
     deg = float(np.deg2rad(1.0))
     alone = [

@@ -71,18 +71,7 @@ class Motion:
         )
 
     def sample(self, time: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Angle and velocity of every joint.
-
-        Parameters
-        ----------
-        time : array_like, shape (N,) or scalar
-            Seconds since the motion began.
-
-        Returns
-        -------
-        angle, velocity : ndarray, shape (N, J) or (J,)
-            rad and rad/s, columns in the order of `joints`.
-        """
+        """Angle and velocity (N, J) or (J,) of all joints, rad and rad/s, at times (N,) or one."""
         pairs = [signal(time) for signal in self.joints.values()]
         angle = np.stack([pair[0] for pair in pairs], axis=-1)
         velocity = np.stack([pair[1] for pair in pairs], axis=-1)
@@ -99,21 +88,9 @@ def hold(duration: float, angle: float = 0.0) -> Signal:
 
 
 def sequence(name: str, parts: Sequence[Signal]) -> Signal:
-    """Play signals one after the other.
+    """Play signals one after the other; the `steady` interval is the whole.
 
-    ValueError if two neighbours do not meet: a jump would be commanded.
-
-    Parameters
-    ----------
-    name : str
-        Name of the result.
-    parts : sequence of Signal
-        Each must begin at the angle where the one before it ends.
-
-    Returns
-    -------
-    Signal
-        Its `steady` interval is the whole.
+    ValueError if two neighbours do not meet at one angle: a jump would be commanded.
     """
     starts = np.concatenate(([0.0], np.cumsum([part.duration for part in parts])))
     for before, after in pairwise(parts):
