@@ -262,4 +262,4 @@ def test_one_physics_for_all_bags_leaves_no_room_for_a_baseline(rig, tmp_path, c
     bags = (rig / 'sound', rig / 'stopped.mcap')
     options = ('--same-physics', '--baseline', rig / 'sound')
     message = refused(capsys, rig, tmp_path / 'out', *bags, *options)
-    assert 'same physics and a baseline exclude each other' in message
+    assert 'same physics and a baseline are mutually exclusive' in message

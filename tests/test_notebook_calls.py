@@ -148,7 +148,7 @@ def test_a_wrong_effect_is_found_before_a_recording_is_read(effect, message):
 @pytest.mark.parametrize(
     ('given', 'options', 'message'),
     [
-        ({'time': TIME, 'bend_x': TIME}, {}, 'dict is no bag: .* from_arrays'),
+        ({'time': TIME, 'bend_x': TIME}, {}, 'dict is not a bag: .* from_arrays'),
         ([], {}, '0 recordings'),
         (['a', 'b'], {'validate': ['c']}, '2 recordings with 1 in validate'),
         ('a', {'without': 'motor/measured_js'}, "without 'm': "),
@@ -285,7 +285,7 @@ def test_several_recordings_are_explained_in_one_call(bag, tmp_path):
     assert [one.verdict for one in found] == ['consistent', 'consistent']
     alone = endoscope_explain.explain(bag, one_joint(), quick=True)
     assert found[0].report | {'runtime_s': 0} == alone.report | {'runtime_s': 0}
-    with pytest.raises(EndoscopeError, match='exclude each other'):
+    with pytest.raises(EndoscopeError, match='are mutually exclusive'):
         endoscope_explain.explain(both, one_joint(), same_physics=True, baseline=bag)
 
 

@@ -106,7 +106,7 @@ class Fitting:
     converged: bool  # further steps would gain nothing
     reason: str  # why it went no further, in words
     steps: int  # of the last fit
-    at_bounds: tuple[str, ...]  # numbers that lie at an end of what is allowed
+    at_bounds: tuple[str, ...]  # numbers that are at a bound
 
 
 @dataclass(frozen=True)

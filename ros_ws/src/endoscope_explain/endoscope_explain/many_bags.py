@@ -245,7 +245,7 @@ def _prepared(
     """Sources of which each can be explained for itself, after all of several were read."""
     if same_physics:
         if any(one.baseline is not None for one in sources):
-            raise TogetherError('same physics and a baseline exclude each other: leave one out')
+            raise TogetherError('same physics and a baseline are mutually exclusive')
         all_given = physics_of_all(sources, jobs, tell or (lambda _: None))
         return [replace(o, given=g) for o, g in zip(sources, all_given, strict=True)]
     if len(sources) > 1:

@@ -359,5 +359,5 @@ def _lacking_message(bag: Bag, topics: Sequence[str], namespace: str | None) -> 
     text = bag.lacking(*topics, namespace=namespace)
     waivable = [t for t in topics if t in WAIVABLE]
     if waivable and len(waivable) == len(topics):
-        text += f'; to explain it all the same give --without {waivable[0]}'
+        text += f'; to explain it without them, give --without {waivable[0]}'
     return text

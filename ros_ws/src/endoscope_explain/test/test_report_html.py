@@ -112,7 +112,7 @@ def test_a_page_needs_no_other_file(page):
 def test_a_page_says_what_was_left_out_and_where(page):
     text = text_of(page)
     assert 'The simulation leaves out stribeck_friction or viscous_friction on bend_x.' in text
-    assert 'cannot tell it from viscous_friction' in text
+    assert 'cannot distinguish it from viscous_friction' in text
     assert 'gain 120 (log evidence that it adds, in nats)' in text
 
 
@@ -121,7 +121,7 @@ def test_a_page_lists_all_that_was_tried(page):
     assert 'no effect, numbers beyond their tolerance 60.0 50.0' in text
     assert 'gravity + breathing 70.0 60.0' in text
     assert 'No effect was tried on bend_y: the refitted plant leaves noise alone.' in text
-    (rest,) = re.findall(r'promised less: ([^.]*)\.', text)
+    (rest,) = re.findall(r'predicted a smaller gain: ([^.]*)\.', text)
     tried = {'stribeck_friction', 'gravity', 'contact', 'breathing'}
     (late,) = re.findall(r'no motion twice: ([^.]*)\.', text) or ['']
     simulated = {e.id for e in CATALOGUE.values() if not e.traits.audited}
@@ -219,7 +219,7 @@ def test_how_the_fits_ended_is_said_beside_their_numbers(stribeck_case):
     text = text_of(html_page(with_explanation(stribeck_case, fitting=fitting)))
     assert 'The fit of bend_x converged (7 steps; no step lowers the misfit).' in text
     assert 'The fit of bend_y did not converge: its numbers are not final' in text
-    assert 'motor_bandwidth and pretension lie at an end of what is allowed.' in text
+    assert 'At a bound: motor_bandwidth and pretension.' in text
 
 
 def test_what_names_leave_over_and_what_differs_besides_is_said_under_the_headline(stribeck_case):
@@ -236,7 +236,7 @@ def test_what_names_leave_over_and_what_differs_besides_is_said_under_the_headli
     parameters = {'bend_x': {'joint_stiffness': stiff, 'pretension': inside}}
     case = with_explanation(stribeck_case, ladder=ladder, parameters=parameters)
     stays, besides = reservations(case)
-    assert 'stays off by 4.2 times its noise, and 1 more is off.' in stays
+    assert 'is still off by 4.2 times its noise, and 1 more is off.' in stays
     assert besides == 'Besides, joint_stiffness of bend_x is 0.006 instead of 0.0045 N m/rad.'
     assert all(map(is_short, (stays, besides)))
     text = text_of(html_page(case))
@@ -389,7 +389,7 @@ def test_sections_and_curves_fit_a_consistent_verdict(consistent):
     assert '>refitted<' in page
     assert '>improved<' not in page
     assert list(judged(consistent, consistent.ladder)) == ['nominal', 'refitted']
-    assert next_step(consistent) == 'Go on with the described plant.'
+    assert next_step(consistent) == 'Continue with the described plant.'
 
 
 def test_what_did_not_move_is_left_out(consistent):

@@ -17,7 +17,7 @@ from endoscope_explain.report.sentences import told
 from endoscope_explain.report.writing import report_mapping
 
 DOUBT = (
-    'stribeck_friction or viscous_friction on bend_x fits this recording, but does not surely '
+    'stribeck_friction or viscous_friction on bend_x fits this recording, but does not clearly '
     'predict the second one better; it may stand for something else.'
 )
 

@@ -136,7 +136,7 @@ def _without_commandless_times(recording: Recording, findings: list[Finding]) ->
     intervals = {topic: usual_interval(s.time) for topic, s in every.items()}
     # A command is in force until the next one: a console that pauses, or whose clutch is released,
     # leaves nothing out. Only where the command has moved on meanwhile some of it is missing, and
-    # not even there if the motors have rested: then it began anew from another pose.
+    # not even there if the motors have rested: then it began again from another pose.
     lost = missing_in(recording.command, gaps[recording.command.topic])
     blind = [
         (a, b)

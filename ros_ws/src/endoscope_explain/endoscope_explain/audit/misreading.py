@@ -209,8 +209,8 @@ def _finding(recording: Recording, mistake: Misreading, before: float, after: fl
     elif mistake.kind == 'factor' and not gear_of_shaft:
         name = 'wrong_unit'
         text = (
-            f'{named} {verb} about {factor:.2g} times what the plant can give, which is no unit of '
-            'force: counts of a converter, not N'
+            f'{named} {verb} about {factor:.2g} times what the plant can give, which is not a unit '
+            'of force: counts of a converter, not N'
         )
         remedy = 'give what one count is in N as scale when the table is converted'
         evidence['factor'] = factor

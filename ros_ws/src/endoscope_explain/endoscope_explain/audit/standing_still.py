@@ -106,7 +106,7 @@ def resting_motor_findings(recording: Recording) -> list[Finding]:
                 (signal,),
                 ((0.0, recording.duration),),
                 f'{signal} stands still while its command moves by {commanded:.3g} rad',
-                'see whether the motor was enabled and free to turn',
+                'check that the motor was enabled and free to turn',
             )
         )
     return findings
@@ -140,7 +140,7 @@ def _finding(
         tuple(column_name(recording, q, c) for q, c in columns),
         ((since, recording.duration),),
         f'{what} is frozen: it repeats one reading from {since:.3f} s to its end while {meanwhile}',
-        'record it anew with its source running',
+        'record it again with its source running',
     )
 
 

@@ -246,8 +246,8 @@ def outlier_finding(joints: Sequence[str], series: Series, wrong: Mask) -> Findi
     share, spread = count / n, NINETY_PERCENT * np.sqrt(count) / n
     typical = float(np.sqrt(np.mean(size**2)))
     worst = int(np.argmax(wrong.sum(axis=0)))
-    befallen = [name for j, name in enumerate(joints) if wrong[:, j].any()]
-    signals = tuple(signal_name('bending', name) for name in befallen)
+    affected = [name for j, name in enumerate(joints) if wrong[:, j].any()]
+    signals = tuple(signal_name('bending', name) for name in affected)
     return Finding(
         showing(Symptom.WRONG_SAMPLES).id,
         Severity.FAULT,

@@ -69,7 +69,7 @@ class FreeParameter:
     # Bounds of the value.
     low: float
     high: float
-    # Gaussian prior of the coordinate; an infinite spread is no prior.
+    # Gaussian prior of the coordinate; an infinite spread is none.
     mean: float = 0.0
     spread: float = math.inf
     # Whether the fit's coordinate is the square of the value over `unit`: of what does nothing in

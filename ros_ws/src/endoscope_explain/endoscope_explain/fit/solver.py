@@ -29,7 +29,7 @@ _NO_STEP = 1e-14
 
 
 class Renewal(Enum):
-    """When the derivative is worked out anew."""
+    """When the derivative is worked out again."""
 
     NEVER = auto()
     WHEN_SLOW = auto()
@@ -39,9 +39,9 @@ class Renewal(Enum):
 class Ended(StrEnum):
     """Why a fit went no further."""
 
-    CONVERGED = 'a step gained less than it is to'
+    CONVERGED = 'the last step gained less than the tolerance'
     NO_STEP = 'no step lowers the misfit'
-    SPENT = 'as many steps were made as it may take'
+    SPENT = 'the limit on steps was reached'
 
 
 @dataclass(frozen=True)

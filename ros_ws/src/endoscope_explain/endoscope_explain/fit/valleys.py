@@ -37,7 +37,7 @@ def out_of_valleys(found: Fit, weight: Array) -> Fit:
             found = _begun_elsewhere(found, place, near, weight)
             found = _begun_at_once(found, place, weight)
     for index, admissible in _counted(found):
-        found = _counted_anew(found, index, admissible, weight)
+        found = _recounted(found, index, admissible, weight)
     return found
 
 
@@ -106,7 +106,7 @@ def _counted(found: Fit) -> list[tuple[int, range]]:
     ]
 
 
-def _counted_anew(found: Fit, index: int, admissible: range, weight: Array) -> Fit:
+def _recounted(found: Fit, index: int, admissible: range, weight: Array) -> Fit:
     """Step a whole number up or down as long as the fit improves, first by two, then by one."""
     tried = {int(found.model.base[index])}
     for stride in STRIDES:

@@ -30,7 +30,7 @@ LATEST_S = 2.0**31
 
 
 class ArraysError(EndoscopeError, ValueError):
-    """Arrays that are no recording, or no commands."""
+    """Arrays that are not a recording, or not commands."""
 
 
 def from_arrays(
@@ -63,7 +63,7 @@ def from_arrays(
     by_topic: dict[str, dict[str, tuple[Array, Array]]] = {}
     for name, given in signals.items():
         if name not in known:
-            raise ArraysError(f'{name} is no signal: {nearest(name, known)}')
+            raise ArraysError(f'{name} is not a signal: {nearest(name, known)}')
         pair = (given.time, given.values) if isinstance(given, Signal) else given
         by_topic.setdefault(known[name][0], {})[name] = _checked(name, pair)
     if not by_topic:

@@ -198,5 +198,5 @@ def _path(bag: Bag) -> Path:
     if isinstance(bag, str | Path):
         return Path(bag)
     raise CallError(
-        f'{type(bag).__name__} is no bag: give a path, or what read or from_arrays gave'
+        f'{type(bag).__name__} is not a bag: give a path, or what read or from_arrays gave'
     )

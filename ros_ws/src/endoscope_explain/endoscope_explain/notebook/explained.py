@@ -32,7 +32,7 @@ from endoscope_explain.report.writing import report_mapping, write_report
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_EFFECTS = ('effect', 'joint', 'not told from', 'number', 'value', '90 % interval', 'unit')
+_EFFECTS = ('effect', 'joint', 'alternatives', 'number', 'value', '90 % interval', 'unit')
 
 
 @dataclass(frozen=True)

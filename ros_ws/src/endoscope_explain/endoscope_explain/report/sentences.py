@@ -154,7 +154,7 @@ def reservations(case: ExplainedCase) -> list[str]:
         if len(off) > 1:
             more = f', and {len(off) - 1} more {"are" if len(off) > 2 else "is"} off'
         said.append(
-            f'{_capital(plain(signal))} stays off by {digits(ratio)} times its noise{more}. '
+            f'{_capital(plain(signal))} is still off by {digits(ratio)} times its noise{more}. '
             'The form differs, or something else is missing too.'
         )
     besides = {key: e for key, e in differing(case).items() if not e.in_band}
@@ -186,14 +186,13 @@ def not_shown(case: ExplainedCase) -> list[str]:
 
 
 def fitting_sentences(case: ExplainedCase) -> list[str]:
-    """Say how each joint's fit ended, and which numbers lie at an end of what is allowed."""
+    """Say how each joint's fit ended, and which numbers are at a bound."""
     said = []
     for joint, each in case.explanation.fitting.items():
         how = 'converged' if each.converged else 'did not converge: its numbers are not final'
         text = f'The fit of {joint} {how} ({each.steps} steps; {each.reason}).'
         if each.at_bounds:
-            lies = 'lies' if len(each.at_bounds) == 1 else 'lie'
-            text += f' There {_all(each.at_bounds)} {lies} at an end of what is allowed.'
+            text += f' At a bound: {_all(each.at_bounds)}.'
         said.append(text)
     return said
 
@@ -221,14 +220,14 @@ def next_step(case: ExplainedCase) -> str:
     if any(e.doubtful for e in case.effects):
         return 'Explain both recordings with --same-physics: what is named then explains both.'
     if case.verdict is Verdict.CONSISTENT:
-        return 'Go on with the described plant.'
+        return 'Continue with the described plant.'
     if case.verdict is Verdict.SENSOR_FAULT:
-        return 'Mend or calibrate the sensor, and record again.'
+        return 'Repair or calibrate the sensor, and record again.'
     if case.verdict is Verdict.RECORDING_FAULT and case.audit.faults():
-        return 'Mend the recording, or go on: nothing was judged where it is wrong.'
+        return 'Repair the recording, or continue: nothing was judged where it is wrong.'
     if not case.validation:
         return 'Judge plant.yaml on a second recording: give one with --validate.'
-    return 'Go on with plant.yaml.'
+    return 'Continue with plant.yaml.'
 
 
 def _differing(case: ExplainedCase) -> str:
@@ -268,9 +267,10 @@ def label(effect: NamedEffect) -> str:
 
 def _doubt(case: ExplainedCase, effect: NamedEffect) -> str:
     passed = effect.definition.traits.depends_on_time
+    stands = 'acted in this one alone, or stands' if passed else 'may stand'
     text = (
-        f'{_named(effect)} fits this recording, but does not surely predict the second one better; '
-        f'it {"acted in this one alone, or stands" if passed else "may stand"} for something else.'
+        f'{_named(effect)} fits this recording, but does not clearly predict the second one '
+        f'better; it {stands} for something else.'
     )
     letter = f'_{axis(effect.joint)}'
     refitted = {s: f for s, f in case.validation.get('refitted', {}).items() if letter in s}
