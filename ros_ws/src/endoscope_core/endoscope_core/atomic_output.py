@@ -10,18 +10,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import OutputError
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 _PARTIAL = re.compile(r'(?<![\w.-])\.partial-[0-9a-f]{8}-')
-
-
-class OutputPlaceError(EndoscopeError, OSError):
-    """Nothing can be written where an output should go to."""
-
-
-class OutputExistsError(EndoscopeError, FileExistsError):
-    """The place that an output should go to is taken."""
 
 
 @contextmanager
@@ -29,13 +21,13 @@ def atomic_file(path: str | Path, *, overwrite: bool = True) -> Iterator[Path]:
     """Write a file under a temporary name; it takes its own name when the block ends well.
 
     Yields a hidden sibling of `path` with the same suffix, not yet there; missing parent folders
-    are made. OutputExistsError where `path` is a folder, or exists and `overwrite` is false.
+    are made. OutputError where `path` is a folder, or exists and `overwrite` is false.
     """
     target = Path(path)
     if target.is_dir():
-        raise OutputExistsError(f'{target} is a folder: name a file')
+        raise OutputError(f'{target} is a folder: name a file')
     if target.exists() and not overwrite:
-        raise OutputExistsError(f'{target} exists already: remove it or name another file')
+        raise OutputError(f'{target} exists already: remove it or name another file')
     partial = _partial_sibling(target)
     try:
         with _named(target):
@@ -50,7 +42,7 @@ def atomic_file(path: str | Path, *, overwrite: bool = True) -> Iterator[Path]:
 def atomic_directory(path: str | Path) -> Iterator[Path]:
     """Fill a folder under a temporary name; it takes its own name when the block ends well.
 
-    Yields an empty hidden sibling of `path`; missing parent folders are made. OutputExistsError
+    Yields an empty hidden sibling of `path`; missing parent folders are made. OutputError
     where `path` is a file or a folder with something in it.
     """
     target = Path(path).resolve()
@@ -71,27 +63,27 @@ def with_final_names(text: str) -> str:
 
 
 def require_free_directory(path: str | Path) -> None:
-    """Check before long work: OutputExistsError or OutputPlaceError if no folder can be written."""
+    """Check before long work: OutputError if no folder can be written."""
     target = Path(path).absolute()
     if target.is_dir():
         if any(target.iterdir()):
-            raise OutputExistsError(f'{target} is not empty: remove it or name another folder')
+            raise OutputError(f'{target} is not empty: remove it or name another folder')
     elif target.exists():
-        raise OutputExistsError(f'{target} is a file: name a folder')
+        raise OutputError(f'{target} is a file: name a folder')
     require_place(target)
 
 
 def require_place(path: str | Path) -> None:
-    """Check before long work: OutputPlaceError if the folder around `path` takes nothing."""
+    """Check before long work: OutputError if the folder around `path` takes nothing."""
     target = Path(path).absolute()
     place = next(parent for parent in target.parents if parent.exists())
     if not place.is_dir():
-        raise OutputPlaceError(f'{target} cannot be made: {place} is a file')
+        raise OutputError(f'{target} cannot be made: {place} is a file')
     try:
         with tempfile.TemporaryDirectory(prefix='.partial-', dir=place):
             pass
     except OSError as error:
-        raise OutputPlaceError(
+        raise OutputError(
             f'{target} cannot be made: {place} takes nothing ({error.strerror})'
         ) from error
 

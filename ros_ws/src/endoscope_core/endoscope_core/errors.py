@@ -26,6 +26,14 @@ class FileError(EndoscopeError, ValueError):
     """A file that cannot be used; the message names the file, the key and what to do."""
 
 
+class InputError(EndoscopeError, ValueError):
+    """A name, number or recording that cannot be used; the message says which are."""
+
+
+class OutputError(EndoscopeError, OSError):
+    """Nothing can be written where an output should go to, or the place is taken."""
+
+
 def nearest(name: str, valid: Iterable[str]) -> str:
     """A hint that names the valid name nearest to a wrong one, and else all of them."""
     valid = list(valid)

@@ -5,7 +5,6 @@ import pytest
 
 from endoscope_core.dataset import (
     CLASSES_DEG,
-    DatasetError,
     configuration_of_size,
     load_dataset,
     make_dataset,
@@ -15,8 +14,9 @@ from endoscope_core.dataset import (
 )
 from endoscope_core.dataset.calibration_dataset import ARRAYS_FILE, MANIFEST_FILE
 from endoscope_core.dataset.rig_variation import GREATEST_UNEVENNESS, backlash_sizes, in_tube
+from endoscope_core.errors import FileError, InputError
 from endoscope_core.metrics import width_at_mid_height
-from endoscope_core.signals import UnknownCalibrationError, calibration_sinusoid
+from endoscope_core.signals import calibration_sinusoid
 
 
 @pytest.fixture(scope='module')
@@ -109,7 +109,7 @@ def test_one_instrument_is_the_same_as_mounted_in_every_tube(small):
     assert len(set(tube_and_hands(again, 'joint_radius'))) == 1
     assert len(set(tube_and_hands(again, 'pretension'))) == 7
     assert (again.manifest['instruments'], again.manifest['reset_pretension']) == ('one', True)
-    with pytest.raises(DatasetError, match='of many instruments'):
+    with pytest.raises(InputError, match='of many instruments'):
         make_dataset(seed=3, per_class=1, reset_pretension=True)
 
 
@@ -142,17 +142,17 @@ def test_a_changed_file_is_found_out(small, tmp_path):
     content = json.loads(manifest.read_text())
     content['arrays_sha256'] = '0' * 64
     manifest.write_text(json.dumps(content))
-    with pytest.raises(DatasetError, match='is not what'):
+    with pytest.raises(FileError, match='is not what'):
         load_dataset(tmp_path / 'data')
     (tmp_path / 'data' / ARRAYS_FILE).write_bytes(b'PK not a zip')
-    with pytest.raises(DatasetError, match='cannot be read'):
+    with pytest.raises(FileError, match='cannot be read'):
         load_dataset(tmp_path / 'data')
 
 
 def test_what_is_no_data_set_is_refused(tmp_path):
-    with pytest.raises(DatasetError, match='endoscope dataset'):
+    with pytest.raises(FileError, match='endoscope dataset'):
         load_dataset(tmp_path)
-    with pytest.raises(DatasetError, match='per_class'):
+    with pytest.raises(InputError, match='per_class'):
         make_dataset(seed=1, per_class=0)
-    with pytest.raises(UnknownCalibrationError, match='nearest is'):
+    with pytest.raises(InputError, match='nearest is'):
         make_dataset(seed=1, per_class=1, motion='breif')

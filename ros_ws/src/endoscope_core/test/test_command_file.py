@@ -1,11 +1,8 @@
 import numpy as np
 import pytest
 
-from endoscope_core.signals.command_file import (
-    CommandFileError,
-    read_command_file,
-    write_command_file,
-)
+from endoscope_core.errors import FileError
+from endoscope_core.signals.command_file import read_command_file, write_command_file
 
 
 def test_what_is_written_is_read_back(tmp_path):
@@ -38,16 +35,16 @@ def test_columns_may_come_in_another_order(tmp_path):
 def test_an_unusable_file_is_refused_with_its_line(tmp_path, text, message):
     path = tmp_path / 'motion.csv'
     path.write_text(text)
-    with pytest.raises(CommandFileError, match=message):
+    with pytest.raises(FileError, match=message):
         read_command_file(path)
 
 
 def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(CommandFileError, match='cannot be read'):
+    with pytest.raises(FileError, match='cannot be read'):
         read_command_file(tmp_path / 'absent.csv')
 
 
 def test_nothing_is_written_of_a_motion_that_is_not_finite(tmp_path):
-    with pytest.raises(CommandFileError, match='not finite'):
+    with pytest.raises(FileError, match='not finite'):
         write_command_file(tmp_path / 'motion.csv', [0.0, 1.0], [[0.0, 0.0], [np.nan, 0.0]])
     assert list(tmp_path.iterdir()) == []

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from endoscope_core.dataset import CLASSES_DEG
+from endoscope_core.errors import FileError, InputError
 from endoscope_core.hysteresis import BoucWenParameters, forward
 from endoscope_core.identification import (
-    ClassParameterError,
-    IdentificationError,
     Recording,
     Servo,
     fit_feedforward,
@@ -83,7 +82,7 @@ def test_the_servo_settles_on_its_command_and_lags_by_its_damping():
     ],
 )
 def test_a_recording_without_hysteresis_is_refused(recordings, complaint):
-    with pytest.raises(IdentificationError, match=complaint):
+    with pytest.raises(InputError, match=complaint):
         fit_model(recordings)
 
 
@@ -98,7 +97,7 @@ def test_shipped_sets_cover_every_class_and_lag_more_in_tighter_tubes():
 
 
 def test_a_class_without_parameters_is_refused():
-    with pytest.raises(ClassParameterError, match='class 55'):
+    with pytest.raises(InputError, match='class 55'):
         parameters_for_class(load_class_parameters(), 55)
 
 
@@ -120,14 +119,14 @@ def test_a_class_without_parameters_is_refused():
 def test_a_file_without_safe_parameters_is_refused(tmp_path, content):
     path = tmp_path / 'classes.json'
     path.write_text(content)
-    with pytest.raises(ClassParameterError, match='holds no bouc_wen'):
+    with pytest.raises(FileError, match='holds no bouc_wen'):
         load_class_parameters(path)
-    with pytest.raises(ClassParameterError, match='is missing'):
+    with pytest.raises(FileError, match='is missing'):
         load_class_parameters(tmp_path / 'none.json')
 
 
 def test_parameters_of_another_model_are_refused(tmp_path):
     path = tmp_path / 'classes.json'
     path.write_text('{"model": "play", "classes": {}}')
-    with pytest.raises(ClassParameterError, match='of play, not of bouc_wen'):
+    with pytest.raises(FileError, match='of play, not of bouc_wen'):
         load_class_parameters(path)

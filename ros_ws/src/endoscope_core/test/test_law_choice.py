@@ -1,12 +1,8 @@
 import pytest
 
 from endoscope_core.control import FeedforwardLaw
-from endoscope_core.identification.law_choice import (
-    CalibrationFindings,
-    LawChoice,
-    LawChoiceError,
-)
-from endoscope_core.identification.updated_table import UpdatedTableError
+from endoscope_core.errors import FileError, InputError
+from endoscope_core.identification.law_choice import CalibrationFindings, LawChoice
 
 
 def test_a_law_is_never_guessed(tmp_path):
@@ -14,13 +10,13 @@ def test_a_law_is_never_guessed(tmp_path):
     nothing = CalibrationFindings()
     assert choice.law('none', 'class', nothing) == FeedforwardLaw()
     for by in ('class', 'size', 'plant'):
-        with pytest.raises(LawChoiceError, match='did not'):
+        with pytest.raises(InputError, match='did not'):
             choice.law('physical', by, nothing)
-    with pytest.raises(LawChoiceError, match='not selected by plant'):
+    with pytest.raises(InputError, match='not selected by plant'):
         choice.law('play', 'plant', nothing)
-    with pytest.raises(LawChoiceError, match='unknown selection'):
+    with pytest.raises(InputError, match='unknown selection'):
         choice.law('play', 'dice', nothing)
-    with pytest.raises(UpdatedTableError, match='outside the table'):
+    with pytest.raises(InputError, match='outside the table'):
         choice.law('play', 'size', CalibrationFindings(size=3.0))
-    with pytest.raises(UpdatedTableError, match='missing'):
+    with pytest.raises(FileError, match='missing'):
         LawChoice(2, table=str(tmp_path / 'none')).law('play', 'size', CalibrationFindings(size=1))

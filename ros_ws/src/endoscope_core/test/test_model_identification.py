@@ -3,6 +3,7 @@ import itertools
 import numpy as np
 import pytest
 
+from endoscope_core.errors import InputError
 from endoscope_core.hysteresis import (
     AsymmetricBoucWenParameters,
     DahlParameters,
@@ -17,13 +18,7 @@ from endoscope_core.hysteresis.memory_model import (
     GREATEST_INVERSE_SLOPE,
     SMALLEST_ALPHA,
 )
-from endoscope_core.identification import (
-    IdentificationError,
-    Recording,
-    Servo,
-    fit_feedforward,
-    fit_model,
-)
+from endoscope_core.identification import Recording, Servo, fit_feedforward, fit_model
 from endoscope_core.identification.feedforward_fit import candidates_for
 
 TIME = np.arange(0.0, 9.0, 0.02)
@@ -95,5 +90,5 @@ def test_the_feed_forward_of_every_model_makes_a_backlash_follow(model):
 
 
 def test_an_unknown_model_is_refused():
-    with pytest.raises(IdentificationError, match='choose one of'):
+    with pytest.raises(InputError, match='choose one of'):
         fit_model([Recording(DRIVER, DRIVER)], 0, 'preisach')

@@ -7,10 +7,9 @@ import pytest
 from outside_data import REAL, needs
 from wrong_way import wrong_way_motion
 
-from endoscope_core.errors import FileError
+from endoscope_core.errors import FileError, InputError
 from endoscope_core.identification.family_fit import (
     PRIORS,
-    FamilyFitError,
     TubeRecording,
     fit_family,
     misfit,
@@ -124,13 +123,13 @@ def test_known_numbers_are_found_again():
 
 
 def test_recordings_that_tell_nothing_are_refused():
-    with pytest.raises(FamilyFitError, match='no recordings'):
+    with pytest.raises(InputError, match='no recordings'):
         fit_family([])
     recording = made_up_recording(MADE_UP, 0.0)
-    with pytest.raises(FamilyFitError, match='bent by 0 deg: 50 samples'):
+    with pytest.raises(InputError, match='bent by 0 deg: 50 samples'):
         fit_family([recording.until(50)])
     recording.angle[3] = np.nan
-    with pytest.raises(FamilyFitError, match='not finite'):
+    with pytest.raises(InputError, match='not finite'):
         fit_family([recording])
 
 

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from safe_parameters import SAFE
 
 from endoscope_core.control import PhysicalParameters
+from endoscope_core.errors import FileError, InputError
 from endoscope_core.hysteresis import (
     AsymmetricBoucWenParameters,
     BoucWenParameters,
@@ -19,7 +20,6 @@ from endoscope_core.identification import (
     KINDS,
     TableEntry,
     UpdatedTable,
-    UpdatedTableError,
     blend,
     load_class_parameters,
 )
@@ -86,7 +86,7 @@ def test_outside_its_range_a_table_refuses(size):
     table = UpdatedTable.of(
         'play', [TableEntry(0.7, FIRST['play']), TableEntry(1.4, OTHER['play'])]
     )
-    with pytest.raises(UpdatedTableError, match='outside the table'):
+    with pytest.raises(InputError, match='outside the table'):
         table.parameters_for(size)
 
 
@@ -101,7 +101,7 @@ def test_outside_its_range_a_table_refuses(size):
     ],
 )
 def test_tables_that_make_no_sense_are_refused(make, complaint):
-    with pytest.raises(UpdatedTableError, match=complaint):
+    with pytest.raises(InputError, match=complaint):
         make()
 
 
@@ -111,9 +111,9 @@ def test_tables_that_make_no_sense_are_refused(make, complaint):
 def test_a_file_that_holds_no_table_is_refused(content, tmp_path):
     path = tmp_path / 'table.json'
     path.write_text(content)
-    with pytest.raises(UpdatedTableError, match='no updated table'):
+    with pytest.raises(FileError, match='no updated table'):
         UpdatedTable.load(path)
-    with pytest.raises(UpdatedTableError, match='missing'):
+    with pytest.raises(FileError, match='missing'):
         UpdatedTable.load(tmp_path / 'nowhere.json')
 
 
@@ -123,7 +123,7 @@ def test_unsafe_parameters_in_a_file_are_refused(tmp_path):
     content = json.loads(path.read_text())
     content['entries'][0]['parameters']['travel'] = 1e-5
     path.write_text(json.dumps(content))
-    with pytest.raises(UpdatedTableError, match='too steep'):
+    with pytest.raises(FileError, match='too steep'):
         UpdatedTable.load(path)
 
 

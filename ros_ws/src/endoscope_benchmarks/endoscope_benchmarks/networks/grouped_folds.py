@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset, DatasetError
+from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
+from endoscope_core.errors import InputError
 
 Rows = NDArray[np.intp]
 
@@ -45,13 +46,13 @@ def grouped_folds(
     """Rows to train with and rows to test with, of each fold.
 
     Classes are as frequent in every fold, and each tube configuration is on one side only.
-    DatasetError if folds are fewer than two, or more than a class has configurations.
+    InputError if folds are fewer than two, or more than a class has configurations.
     """
     classes = np.unique(dataset.class_deg)
     least = min(len(set(dataset.configuration[dataset.class_deg == c])) for c in classes)
     if not 2 <= folds <= least:
         may = f'give 2 to {least} folds' if least >= 2 else 'at least 2 a class are needed'
-        raise DatasetError(
+        raise InputError(
             f'{folds} folds cannot be made of {least} recorded tubes a class: {may}, or make more '
             'of them with `endoscope dataset --n`'
         )

@@ -90,7 +90,7 @@ def cross_validate(
 ) -> CrossValidation:
     """Stratified k-fold cross-validation that keeps each tube configuration on one side.
 
-    DatasetError as of `grouped_folds`.
+    InputError as of `grouped_folds`.
     """
     named = np.zeros_like(dataset.class_deg)
     split = grouped_folds(dataset, seed, folds)

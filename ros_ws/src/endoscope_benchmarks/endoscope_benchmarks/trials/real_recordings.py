@@ -15,15 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_benchmarks.trials.tension_loop import tension_loop_width
+from endoscope_core.errors import InputError
 from endoscope_core.hysteresis.inverse import HysteresisParameters
-from endoscope_core.identification import (
-    ModelFit,
-    Recording,
-    TableEntry,
-    UpdatedTable,
-    UpdatedTableError,
-    fit_model,
-)
+from endoscope_core.identification import ModelFit, Recording, TableEntry, UpdatedTable, fit_model
 from endoscope_core.identification.family_fit import (
     ACTUAL,
     CYCLE_S,
@@ -178,7 +172,7 @@ def left_one_out(recordings: Sequence[RealRecording], model: str, seed: int) -> 
         left: float | None
         try:
             parameters = table.parameters_for(size)
-        except UpdatedTableError:
+        except InputError:
             left = None
         else:
             # The tubes' offsets are their own; a straight tube's zero is set by hand.
@@ -198,5 +192,5 @@ def left_one_out(recordings: Sequence[RealRecording], model: str, seed: int) -> 
 
 def _hysteresis(parameters: object) -> HysteresisParameters:
     if not isinstance(parameters, HysteresisParameters):
-        raise UpdatedTableError(f'{type(parameters).__name__} is no hysteresis model')
+        raise InputError(f'{type(parameters).__name__} is no hysteresis model')
     return parameters

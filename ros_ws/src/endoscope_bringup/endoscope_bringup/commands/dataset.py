@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from endoscope_bringup.subcommands import seed
+from endoscope_core.errors import InputError
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -46,12 +47,12 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 def run(args: argparse.Namespace) -> int:
     """Make and write the data set; return 0."""
     from endoscope_core.atomic_output import require_free_directory
-    from endoscope_core.dataset import CLASSES_DEG, DatasetError, make_dataset, save_dataset
+    from endoscope_core.dataset import CLASSES_DEG, make_dataset, save_dataset
 
     require_free_directory(args.out)
     classes = len(CLASSES_DEG)
     if args.n < classes or args.n % classes:
-        raise DatasetError(f'--n {args.n}: give a multiple of {classes}, the number of classes')
+        raise InputError(f'--n {args.n}: give a multiple of {classes}, the number of classes')
     dataset = make_dataset(
         args.seed,
         args.n // classes,

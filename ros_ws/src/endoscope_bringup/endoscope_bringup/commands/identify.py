@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from endoscope_bringup.subcommands import COUNT, seed, within
+from endoscope_core.errors import FileError
 
 if TYPE_CHECKING:
     from endoscope_bags import Recording as Bag
@@ -206,7 +207,7 @@ def _extend(
     import numpy as np
 
     from endoscope_bringup.learning.joints_of_bag import GRID_STEP
-    from endoscope_core.identification import Servo, TableEntry, UpdatedTable, UpdatedTableError
+    from endoscope_core.identification import Servo, TableEntry, UpdatedTable
     from endoscope_core.metrics import width_at_mid_height
 
     # The motor follows its command late; the backlash size is that over the command.
@@ -216,7 +217,7 @@ def _extend(
     if args.table.is_file():
         table = UpdatedTable.load(args.table)
         if table.model != args.model:
-            raise UpdatedTableError(f'{args.table} is a table of {table.model}, not {args.model}')
+            raise FileError(f'{args.table} is a table of {table.model}, not {args.model}')
         table = table.extended(entry)
     else:
         table = UpdatedTable.of(args.model, [entry])

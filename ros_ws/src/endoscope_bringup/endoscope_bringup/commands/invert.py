@@ -68,17 +68,13 @@ def _desired(motion: str, joints: Sequence[str], tick: float) -> 'tuple[Array, A
     import numpy as np
 
     from endoscope_bags import open_bag
-    from endoscope_core.errors import nearest
-    from endoscope_core.signals.command_file import (
-        CommandFileError,
-        CommandTable,
-        read_command_file,
-    )
+    from endoscope_core.errors import FileError, nearest
+    from endoscope_core.signals.command_file import CommandTable, read_command_file
     from endoscope_core.signals.motions import MOTIONS, motion_by_name
 
     path = Path(motion)
     if motion not in MOTIONS and not path.exists():
-        raise CommandFileError(f'no motion and no file {motion!r}: {nearest(motion, MOTIONS)}')
+        raise FileError(f'no motion and no file {motion!r}: {nearest(motion, MOTIONS)}')
     if motion in MOTIONS:
         named = motion_by_name(motion)
         time = np.arange(0.0, named.duration, tick)
@@ -90,9 +86,7 @@ def _desired(motion: str, joints: Sequence[str], tick: float) -> 'tuple[Array, A
     series = open_bag(path).joint_state('slave/servo_jp', finite=('position',))
     missing = set(joints) - set(series.names)
     if series.position is None or missing:
-        raise CommandFileError(
-            f'{path}: {series.topic} has no angle of {", ".join(sorted(missing))}'
-        )
+        raise FileError(f'{path}: {series.topic} has no angle of {", ".join(sorted(missing))}')
     seconds = series.seconds(int(series.stamp_ns[0]))
     new = np.r_[True, np.diff(seconds) > 0.0]
     columns = [series.names.index(joint) for joint in joints]

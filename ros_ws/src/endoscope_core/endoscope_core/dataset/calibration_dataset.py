@@ -20,7 +20,7 @@ from endoscope_core.dataset.rig_variation import (
     random_instrument,
     with_pretension_reset,
 )
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import FileError, InputError
 from endoscope_core.physics import PlantDescription, SensorModel, simulate
 from endoscope_core.signals import CALIBRATION_RATE, SINUSOID, CalibrationMotion, calibration_motion
 
@@ -61,10 +61,6 @@ def record_calibration(
     readings = sensors.bending(trajectory.bending[::every])
     actual = [np.interp(trajectory.time, trajectory.time[::every], r) for r in readings.T]
     return CalibrationRecording(sensors.tension(wires), angle, velocity, np.stack(actual, axis=1))
-
-
-class DatasetError(EndoscopeError, ValueError):
-    """A data set cannot be made as asked, or what lies in a folder is none."""
 
 
 @dataclass(frozen=True)
@@ -122,11 +118,9 @@ def make_dataset(
     """
     calibration = calibration_motion(motion)
     if per_class < 1 or seed < 0:
-        raise DatasetError(
-            f'per_class = {per_class} must be positive and seed = {seed} not negative'
-        )
+        raise InputError(f'per_class = {per_class} must be positive and seed = {seed} not negative')
     if reset_pretension and not one_instrument:
-        raise DatasetError('the pretension is set anew for each recording of many instruments')
+        raise InputError('the pretension is set again for each recording of many instruments')
     instrument = _of_all_classes(seed) if one_instrument else None
     total = per_class * len(CLASSES_DEG)
     configurations: list[TubeConfiguration] = []
@@ -181,7 +175,7 @@ def make_dataset(
 def save_dataset(dataset: CalibrationDataset, folder: str | Path) -> None:
     """Write a data set to a new folder, whole or not at all.
 
-    OutputExistsError if there is something at `folder` already.
+    OutputError if there is something at `folder` already.
     """
     arrays = {name: value for name, value in vars(dataset).items() if name != 'manifest'}
     with atomic_directory(folder) as partial:
@@ -198,13 +192,13 @@ def is_dataset(folder: str | Path) -> bool:
 def load_dataset(folder: str | Path) -> CalibrationDataset:
     """Read a data set.
 
-    DatasetError if the folder holds none, or its arrays are not those that the manifest was written
+    FileError if the folder holds none, or its arrays are not those that the manifest was written
     for.
     """
     folder = Path(folder)
     for name in (MANIFEST_FILE, ARRAYS_FILE):
         if not (folder / name).is_file():
-            raise DatasetError(
+            raise FileError(
                 f'{folder} is no data set: it has no {name}; make one with `endoscope dataset`'
             )
     try:
@@ -214,9 +208,9 @@ def load_dataset(folder: str | Path) -> CalibrationDataset:
         intact = _arrays_hash(arrays) == manifest['arrays_sha256']
         dataset = CalibrationDataset(**arrays, manifest=manifest)
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise DatasetError(f'{folder} cannot be read as a data set: {error}') from error
+        raise FileError(f'{folder} cannot be read as a data set: {error}') from error
     if not intact:
-        raise DatasetError(f'{folder}: {ARRAYS_FILE} is not what {MANIFEST_FILE} was written for')
+        raise FileError(f'{folder}: {ARRAYS_FILE} is not what {MANIFEST_FILE} was written for')
     return dataset
 
 
@@ -235,7 +229,7 @@ def _draw(
         configuration = configuration_of_size(used, float(size), unevenness)
         if configuration is not None:
             return configuration
-    raise DatasetError(f'no instrument of {_MOST_RIGS} reaches a backlash size of {class_deg} deg')
+    raise InputError(f'no instrument of {_MOST_RIGS} reaches a backlash size of {class_deg} deg')
 
 
 def _of_all_classes(seed: int) -> Instrument:
@@ -250,7 +244,7 @@ def _of_all_classes(seed: int) -> Instrument:
         instrument = random_instrument(generator)
         if all(configuration_of_size(instrument, float(np.deg2rad(x)), u) for x, u in ends):
             return instrument
-    raise DatasetError(f'no instrument of {_MOST_RIGS} reaches all backlash sizes')
+    raise InputError(f'no instrument of {_MOST_RIGS} reaches all backlash sizes')
 
 
 def _arrays_hash(arrays: dict[str, NDArray[Any]]) -> str:

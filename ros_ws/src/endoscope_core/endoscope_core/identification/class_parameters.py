@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from endoscope_core.choices import PHYSICAL
 from endoscope_core.control.internal_model import PhysicalParameters
 from endoscope_core.dataset import CalibrationDataset
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import FileError, InputError
 from endoscope_core.identification.feedforward_fit import FeedforwardFit, Servo, fit_feedforward
 from endoscope_core.identification.hysteresis_fit import ModelFit, Recording, fit_model
 from endoscope_core.identification.plant_fit import fit_plant
@@ -29,10 +29,6 @@ from endoscope_core.schema import read
 from endoscope_core.signals import CALIBRATION_RATE
 
 _SAMPLE_STEP = 10
-
-
-class ClassParameterError(EndoscopeError, ValueError):
-    """A file that holds no parameter sets, or a class that has none."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +55,7 @@ def identify_classes(
     are used, and `progress` is called with a line for each class.
     """
     if model not in KINDS:
-        raise ClassParameterError(f'unknown model {model!r}: choose one of {", ".join(KINDS)}')
+        raise InputError(f'unknown model {model!r}: choose one of {", ".join(KINDS)}')
     found = []
     for class_deg in sorted({int(c) for c in dataset.class_deg}):
         chosen = np.flatnonzero(dataset.class_deg == class_deg)[:recordings_per_class]
@@ -155,22 +151,22 @@ def load_class_parameters(
     """
     path = shipped_table_path(model) if path is None else Path(path)
     if not path.is_file():
-        raise ClassParameterError(
+        raise FileError(
             f'{path} is missing: make parameter sets with `endoscope identify DATASET --model '
             f'{model}`'
         )
     try:
         file = read(_File, json.loads(path.read_text(encoding='utf-8')), path.name)
-        if file.model != model:
-            raise ClassParameterError(f'{path} holds parameters of {file.model}, not of {model}')
-        return {
-            int(class_deg): parameters_from_dict(model, sets.feedforward)
-            for class_deg, sets in file.classes.items()
+        sets = file.classes if file.model == model else {}
+        parameters = {
+            int(class_deg): parameters_from_dict(model, found.feedforward)
+            for class_deg, found in sets.items()
         }
-    except ClassParameterError:
-        raise
     except (ValueError, TypeError, RecursionError) as error:
-        raise ClassParameterError(f'{path} holds no {model} parameter sets: {error}') from error
+        raise FileError(f'{path} holds no {model} parameter sets: {error}') from error
+    if file.model != model:
+        raise FileError(f'{path} holds parameters of {file.model}, not of {model}')
+    return parameters
 
 
 @dataclass(frozen=True)
@@ -193,11 +189,11 @@ class _File:
 def parameters_for_class(sets: Mapping[int, LawParameters], class_deg: int) -> LawParameters:
     """The set of a class.
 
-    ClassParameterError if there is none: parameters are never guessed.
+    InputError if there is none: parameters are never guessed.
     """
     if class_deg not in sets:
         known = ', '.join(str(c) for c in sorted(sets))
-        raise ClassParameterError(f'no parameters for class {class_deg} deg (there are {known})')
+        raise InputError(f'no parameters for class {class_deg} deg (there are {known})')
     return sets[class_deg]
 
 

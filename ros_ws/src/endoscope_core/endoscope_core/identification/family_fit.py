@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from endoscope_core.errors import EndoscopeError
-from endoscope_core.identification.hysteresis_fit import IdentificationError
+from endoscope_core.errors import FileError, InputError
 from endoscope_core.metrics import width_at_mid_height
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.family import SIGNED, Readings, TubeFamily
@@ -65,10 +64,6 @@ ROW_S = 5.0e-3
 """Seconds between rows. The phase column counts loops and is no clock."""
 PHASE, DESIRED, ACTUAL, POSITIVE, NEGATIVE = 0, 1, 3, 4, 5
 """Columns: phase in rad, desired and actual angle in deg, tension of both wires in N."""
-
-
-class FamilyFitError(EndoscopeError, ValueError):
-    """Recordings from which no family can be identified."""
 
 
 @dataclass(frozen=True)
@@ -269,17 +264,17 @@ def _family(
 
 def _check(recordings: Sequence[TubeRecording]) -> None:
     if not recordings:
-        raise FamilyFitError('no recordings: give those of at least one tube')
+        raise InputError('no recordings: give those of at least one tube')
     for recording in recordings:
         name = f'tube bent by {math.degrees(recording.bend):.0f} deg'
         samples = len(recording.desired)
         if recording.angle.shape != (samples,) or recording.tension.shape != (samples, 2):
-            raise FamilyFitError(f'{name}: angle or tension has another length than the command')
+            raise InputError(f'{name}: angle or tension has another length than the command')
         if samples < 100:
-            raise FamilyFitError(f'{name}: {samples} samples are too few')
+            raise InputError(f'{name}: {samples} samples are too few')
         for values in (recording.desired, recording.angle, recording.tension):
             if not np.all(np.isfinite(values)):
-                raise FamilyFitError(f'{name}: a value is not finite')
+                raise InputError(f'{name}: a value is not finite')
 
 
 def tube_recordings(folder: Path) -> list[TubeRecording]:
@@ -289,7 +284,7 @@ def tube_recordings(folder: Path) -> list[TubeRecording]:
         table = np.loadtxt(path, delimiter=',')
         cycles = np.searchsorted(table[:, PHASE], (0.0, CYCLE_S, 2.0 * CYCLE_S)).tolist()
         if table[-1, PHASE] < 2.0 * CYCLE_S or cycles[0] != 0:
-            raise IdentificationError(f'{path}: fewer than two whole cycles')
+            raise FileError(f'{path}: fewer than two whole cycles')
         found.append(
             TubeRecording(
                 float(np.deg2rad(float(path.stem))),
@@ -301,5 +296,5 @@ def tube_recordings(folder: Path) -> list[TubeRecording]:
             )
         )
     if not found:
-        raise IdentificationError(f'{folder}: no recordings of tubes (files such as 60.txt)')
+        raise FileError(f'{folder}: no recordings of tubes (files such as 60.txt)')
     return sorted(found, key=lambda recording: recording.bend)

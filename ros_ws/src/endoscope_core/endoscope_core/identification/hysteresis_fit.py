@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution, lsq_linear
 
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import InputError
 from endoscope_core.hysteresis import (
     AsymmetricBoucWenParameters,
     BoucWenParameters,
@@ -158,10 +158,6 @@ FAMILIES: dict[str, ModelFamily] = {
 of the gap are joined by a slope, which real wires have."""
 
 
-class IdentificationError(EndoscopeError, ValueError):
-    """A recording from which nothing can be identified."""
-
-
 @dataclass(frozen=True)
 class Recording:
     """Motor and joint of one recording (N,) in rad, evenly sampled."""
@@ -212,7 +208,7 @@ def fit_model(recordings: Sequence[Recording], seed: int = 0, model: str = 'bouc
     """Fit a hysteresis model to one or more recordings (rad) of the same tube or class.
 
     What comes out is safe by construction: the boxes are those of the parameter classes, and where
-    the inverse would be too steep the travel is lengthened. IdentificationError if the model is
+    the inverse would be too steep the travel is lengthened. InputError if the model is
     unknown, there is no recording, one is empty or not finite, or the motor or the joint hardly
     moves.
     """
@@ -221,7 +217,7 @@ def fit_model(recordings: Sequence[Recording], seed: int = 0, model: str = 'bouc
         return _fit_play_stack(recordings)
     if model not in FAMILIES:
         known = ', '.join([*FAMILIES, 'prandtl_ishlinskii'])
-        raise IdentificationError(f'unknown model {model!r}: choose one of {known}')
+        raise InputError(f'unknown model {model!r}: choose one of {known}')
     family = FAMILIES[model]
     starts = [k for k, recording in enumerate(recordings) if not recording.rested]
     size = len(family.shape_bounds)
@@ -319,18 +315,18 @@ def _linear_part(
 
 def _check(recordings: Sequence[Recording]) -> None:
     if not recordings:
-        raise IdentificationError('there is no recording to identify from')
+        raise InputError('there is no recording to identify from')
     for k, recording in enumerate(recordings):
         for name, values in (('motor', recording.driver), ('bending', recording.actual)):
             if len(values) < 100 or not np.all(np.isfinite(values)):
-                raise IdentificationError(
+                raise InputError(
                     f'recording {k}: the {name} angle has {len(values)} samples, of which all must '
                     'be finite and at least 100 there'
                 )
             if np.ptp(values) < _SMALLEST_MOTION:
-                raise IdentificationError(
+                raise InputError(
                     f'recording {k}: the {name} angle moves by less than 1 deg, which shows no '
                     'hysteresis; record a calibration or commissioning motion'
                 )
         if len(recording.driver) != len(recording.actual):
-            raise IdentificationError(f'recording {k}: motor and bending differ in length')
+            raise InputError(f'recording {k}: motor and bending differ in length')

@@ -15,16 +15,12 @@ from endoscope_core.choices import (
     SELECTIONS,
 )
 from endoscope_core.control import FeedforwardLaw, PhysicalParameters, Reach
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import FileError, InputError
 from endoscope_core.identification.class_parameters import (
     load_class_parameters,
     parameters_for_class,
 )
 from endoscope_core.identification.updated_table import LawParameters, UpdatedTable
-
-
-class LawChoiceError(EndoscopeError, ValueError):
-    """A calibration that does not say what the chosen compensation needs."""
 
 
 @dataclass(frozen=True)
@@ -57,29 +53,28 @@ class LawChoice:
 
         By 'class' it takes the class's set (first paper), by 'size' it blends the updated table at
         the regressed backlash size, by 'plant' it takes the plant that the calibration identified.
-        A LawChoiceError says what is needed and was not found, since nothing is guessed; a file
-        that cannot be used, or has nothing for this class or size, is a ClassParameterError or an
-        UpdatedTableError.
+        InputError if something is needed and was not found, since nothing is guessed; FileError if
+        a file cannot be used.
         """
         if mode == 'none':
             return FeedforwardLaw()
         model = PHYSICAL if mode == ADAPTIVE_PHYSICAL else mode
         if selected_by == BY_PLANT:
             if model != PHYSICAL:
-                raise LawChoiceError(f'mode {mode} is not selected by plant: take class or size')
+                raise InputError(f'mode {mode} is not selected by plant: take class or size')
             if len(findings.plants) != self._joints:
-                raise LawChoiceError('the calibration did not identify the plant')
+                raise InputError('the calibration did not identify the plant')
             return FeedforwardLaw(mode, findings.plants)
         if selected_by == BY_SIZE:
             if findings.size is None or not math.isfinite(findings.size):
-                raise LawChoiceError('the calibration did not find a backlash size')
+                raise InputError('the calibration did not find a backlash size')
             parameters = self._table_of(model).parameters_for(findings.size)
         elif selected_by == BY_CLASS:
             if findings.class_deg is None:
-                raise LawChoiceError('the calibration did not find a class')
+                raise InputError('the calibration did not find a class')
             parameters = parameters_for_class(self._sets_of(model), findings.class_deg)
         else:
-            raise LawChoiceError(
+            raise InputError(
                 f'unknown selection {selected_by!r}: choose one of {", ".join(SELECTIONS)}'
             )
         return FeedforwardLaw(mode, (parameters,) * self._joints)
@@ -96,7 +91,7 @@ class LawChoice:
         if self._table:
             table = UpdatedTable.load(self._table)
             if table.model != model:
-                raise LawChoiceError(f'{self._table} is a table of {table.model}, not of {model}')
+                raise FileError(f'{self._table} is a table of {table.model}, not of {model}')
         else:
             table = UpdatedTable.of_classes(model, self._sets_of(model))
         self._tables[model] = table

@@ -16,7 +16,7 @@ from endoscope_core.atomic_output import write_text
 from endoscope_core.choices import PHYSICAL
 from endoscope_core.control.feedforward import LawParameters
 from endoscope_core.control.internal_model import PhysicalParameters
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import FileError, InputError
 from endoscope_core.hysteresis import (
     AsymmetricBoucWenParameters,
     BoucWenParameters,
@@ -155,10 +155,6 @@ def _asymmetric(point: list[float]) -> AsymmetricBoucWenParameters:
     )
 
 
-class UpdatedTableError(EndoscopeError, ValueError):
-    """A table that cannot be read, or a configuration that it does not cover."""
-
-
 @dataclass(frozen=True)
 class TableEntry:
     """One calibrated configuration, named by its backlash size in rad."""
@@ -176,7 +172,7 @@ class UpdatedTable:
     backlash size that the calibration regressed, and between two entries the parameters are blended
     (`blend`), which keeps them safe; beyond the first and the last nothing is extrapolated.
 
-    UpdatedTableError if the model is unknown, an entry is of another kind, a size is not finite and
+    InputError if the model is unknown, an entry is of another kind, a size is not finite and
     positive, or sizes do not increase.
     """
 
@@ -185,21 +181,19 @@ class UpdatedTable:
 
     def __post_init__(self) -> None:
         if self.model not in KINDS:
-            raise UpdatedTableError(
-                f'unknown model {self.model!r}: choose one of {", ".join(KINDS)}'
-            )
+            raise InputError(f'unknown model {self.model!r}: choose one of {", ".join(KINDS)}')
         if not self.entries:
-            raise UpdatedTableError('a table needs at least one entry')
+            raise InputError('a table needs at least one entry')
         for entry in self.entries:
             if not (math.isfinite(entry.size) and entry.size > 0.0):
-                raise UpdatedTableError(f'backlash size {entry.size} must be positive and finite')
+                raise InputError(f'backlash size {entry.size} must be positive and finite')
             if not isinstance(entry.parameters, KINDS[self.model]):
-                raise UpdatedTableError(
+                raise InputError(
                     f'an entry of a {self.model} table holds {type(entry.parameters).__name__}'
                 )
         sizes = self.sizes
         if any(after <= before for before, after in pairwise(sizes)):
-            raise UpdatedTableError('the sizes of a table must increase')
+            raise InputError('the sizes of a table must increase')
 
     @classmethod
     def of(cls, model: str, entries: Iterable[TableEntry]) -> UpdatedTable:
@@ -225,12 +219,12 @@ class UpdatedTable:
     def parameters_for(self, size: float) -> LawParameters:
         """Parameters for a backlash size in rad.
 
-        UpdatedTableError if the size is not finite or outside the table: parameters are never
+        InputError if the size is not finite or outside the table: parameters are never
         guessed.
         """
         sizes = self.sizes
         if not sizes[0] <= size <= sizes[-1]:
-            raise UpdatedTableError(
+            raise InputError(
                 f'backlash size {math.degrees(size):.1f} deg is outside the table, which covers '
                 f'{math.degrees(sizes[0]):.1f} to {math.degrees(sizes[-1]):.1f} deg: calibrate '
                 'with the tracker and extend the table'
@@ -269,11 +263,11 @@ class UpdatedTable:
     def load(cls, path: str | Path) -> UpdatedTable:
         """Read a table.
 
-        UpdatedTableError if the file is missing, holds something else, or unsafe parameters.
+        FileError if the file is missing, holds something else, or unsafe parameters.
         """
         path = Path(path)
         if not path.is_file():
-            raise UpdatedTableError(f'{path} is missing: make a table with `endoscope identify`')
+            raise FileError(f'{path} is missing: make a table with `endoscope identify`')
         try:
             file = read(_File, json.loads(path.read_text(encoding='utf-8')), path.name)
             entries = [
@@ -284,7 +278,7 @@ class UpdatedTable:
             ]
             return cls.of(file.model, entries)
         except (ValueError, TypeError, RecursionError) as error:
-            raise UpdatedTableError(f'{path} holds no updated table: {error}') from error
+            raise FileError(f'{path} holds no updated table: {error}') from error
 
 
 @dataclass(frozen=True)

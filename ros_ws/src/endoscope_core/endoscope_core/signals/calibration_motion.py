@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from endoscope_core.choices import BRIEF, SINUSOID
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import InputError
 from endoscope_core.signals.signal import FloatArray, Signal, come_to_rest, sequence, smooth_step
 
 CALIBRATION_AMPLITUDE = float(np.deg2rad(90.0))
@@ -99,10 +99,6 @@ def brief_calibration() -> Signal:
     )
 
 
-class UnknownCalibrationError(EndoscopeError, ValueError):
-    """A calibration motion that there is none of."""
-
-
 @dataclass(frozen=True)
 class CalibrationMotion:
     """What a calibration commands, and how much of it is recorded."""
@@ -126,11 +122,11 @@ _MOTIONS: dict[str, tuple[Callable[[], Signal], float]] = {
 def calibration_motion(name: str = SINUSOID) -> CalibrationMotion:
     """Calibration motion of a name, one of `CALIBRATION_MOTIONS`.
 
-    UnknownCalibrationError if there is none of that name; the message names the nearest.
+    InputError if there is none of that name; the message names the nearest.
     """
     if name not in _MOTIONS:
         near = difflib.get_close_matches(name, _MOTIONS, n=1, cutoff=0.0)
-        raise UnknownCalibrationError(
+        raise InputError(
             f'unknown calibration motion {name!r}, nearest is {near[0]!r} '
             f'(known: {", ".join(_MOTIONS)})'
         )

@@ -14,16 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from endoscope_core.atomic_output import write_text
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import FileError
 
 FloatArray = NDArray[np.float64]
 
 TIME = 'time'
 JOINTS = ('bend_x', 'bend_y')
-
-
-class CommandFileError(EndoscopeError, ValueError):
-    """A command file that cannot be played; the message names the line."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +43,7 @@ class CommandTable:
 def write_command_file(
     path: str | Path, time: ArrayLike, angle: ArrayLike, joints: Sequence[str] = JOINTS
 ) -> None:
-    """Write time (N,) in s and angle (N, J) in rad, whole or not at all; else CommandFileError."""
+    """Write time (N,) in s and angle (N, J) in rad, whole or not at all; else FileError."""
     time, angle = np.asarray(time, float), np.asarray(angle, float)
     table = CommandTable(tuple(joints), time, angle)
     _check(table, str(path))
@@ -60,7 +56,7 @@ def write_command_file(
 
 
 def read_command_file(path: str | Path, joints: Sequence[str] = JOINTS) -> CommandTable:
-    """Read a command file into the order of `joints`; CommandFileError where it is not usable."""
+    """Read a command file into the order of `joints`; FileError where it is not usable."""
     path = Path(path)
     wanted = (TIME, *joints)
     try:
@@ -69,15 +65,15 @@ def read_command_file(path: str | Path, joints: Sequence[str] = JOINTS) -> Comma
             columns = list(reader.fieldnames or ())
             doubled = [c for c in wanted if columns.count(c) > 1]
             if doubled:
-                raise CommandFileError(f'{path}: two columns {", ".join(doubled)}')
+                raise FileError(f'{path}: two columns {", ".join(doubled)}')
             missing = [c for c in wanted if c not in columns]
             if missing:
-                raise CommandFileError(f'{path}: no column {", ".join(missing)}')
+                raise FileError(f'{path}: no column {", ".join(missing)}')
             rows = [_numbers(path, reader.line_num, row, wanted) for row in reader]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise CommandFileError(f'{path} cannot be read: {error}') from error
+        raise FileError(f'{path} cannot be read: {error}') from error
     if len(rows) < 2:
-        raise CommandFileError(f'{path}: fewer than two rows')
+        raise FileError(f'{path}: fewer than two rows')
     numbers = np.array(rows)
     table = CommandTable(tuple(joints), numbers[:, 0], numbers[:, 1:])
     _check(table, str(path))
@@ -88,20 +84,18 @@ def _numbers(path: Path, line: int, row: dict[str, str], wanted: Sequence[str]) 
     try:
         values = [float(row[name]) for name in wanted]
     except (TypeError, ValueError) as error:
-        raise CommandFileError(f'{path}: line {line} holds something else than numbers') from error
+        raise FileError(f'{path}: line {line} holds something else than numbers') from error
     if not all(math.isfinite(value) for value in values):
-        raise CommandFileError(f'{path}: line {line} holds a value that is not finite')
+        raise FileError(f'{path}: line {line} holds a value that is not finite')
     return values
 
 
 def _check(table: CommandTable, name: str) -> None:
     if table.angle.shape != (len(table.time), len(table.joints)) or len(table.time) < 2:
-        raise CommandFileError(
-            f'{name}: {len(table.time)} times for angles of shape {table.angle.shape}'
-        )
+        raise FileError(f'{name}: {len(table.time)} times for angles of shape {table.angle.shape}')
     if not (np.isfinite(table.time).all() and np.isfinite(table.angle).all()):
-        raise CommandFileError(f'{name}: a value is not finite')
+        raise FileError(f'{name}: a value is not finite')
     # Differences of neighbours can overflow; the order cannot.
     backward = np.flatnonzero(table.time[1:] <= table.time[:-1])
     if len(backward):
-        raise CommandFileError(f'{name}: time does not increase at line {backward[0] + 3}')
+        raise FileError(f'{name}: time does not increase at line {backward[0] + 3}')

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import InputError
 from endoscope_core.signals.calibration_motion import calibration_sinusoid
 from endoscope_core.signals.signal import FloatArray, Motion, Signal, hold, move, sequence, window
 
@@ -172,10 +172,6 @@ def commissioning_motion(seed: int = 1) -> Motion:
     return Motion('commissioning', {'bend_x': x, 'bend_y': y})
 
 
-class UnknownMotionError(EndoscopeError, ValueError):
-    """A motion that is not in the catalogue."""
-
-
 def both_joints(signal: Signal) -> Motion:
     """The same signal for `bend_x` and `bend_y`."""
     return Motion(signal.name, {'bend_x': signal, 'bend_y': signal})
@@ -193,11 +189,11 @@ MOTIONS: dict[str, Callable[[], Motion]] = {
 def motion_by_name(name: str) -> Motion:
     """Motion of both joints called `name`.
 
-    UnknownMotionError if there is none of that name; the message names the nearest.
+    InputError if there is none of that name; the message names the nearest.
     """
     if name not in MOTIONS:
         near = difflib.get_close_matches(name, MOTIONS, n=1, cutoff=0.0)
-        raise UnknownMotionError(
+        raise InputError(
             f'unknown motion {name!r}, nearest is {near[0]!r} (known: {", ".join(MOTIONS)})'
         )
     return MOTIONS[name]()

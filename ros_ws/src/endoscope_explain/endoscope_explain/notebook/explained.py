@@ -89,7 +89,7 @@ class Explained:
 
         Raises
         ------
-        OutputExistsError
+        OutputError
             There is something in it.
         """
         with atomic_directory(folder) as partial:

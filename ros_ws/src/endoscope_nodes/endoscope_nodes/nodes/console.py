@@ -17,9 +17,9 @@ from endoscope_core.control import (
     keep_within,
     reach_in_words,
 )
+from endoscope_core.errors import FileError
 from endoscope_core.safety import MotionLimits, MotionShaper
 from endoscope_core.safety.motion_session import STALL_NS
-from endoscope_core.signals.command_file import CommandFileError
 from endoscope_nodes import names
 from endoscope_nodes.client.calibration_result import findings_of, is_of_no_class
 from endoscope_nodes.client.handle_sender import CLUTCH_PERIOD_NS, clutch_message
@@ -125,7 +125,7 @@ class ConsoleNode(EndoscopeNode):
         if parameters.source == 'file':
             try:
                 return load_command_file(Path(parameters.command_file), TICK_S)
-            except CommandFileError as error:
+            except FileError as error:
                 raise ParameterError(f"console: parameter 'command_file': {error}") from error
         return None
 
