@@ -78,13 +78,13 @@ def require_place(path: str | Path) -> None:
     target = Path(path).absolute()
     place = next(parent for parent in target.parents if parent.exists())
     if not place.is_dir():
-        raise OutputError(f'{target} cannot be made: {place} is a file')
+        raise OutputError(f'{target} cannot be created: {place} is a file')
     try:
         with tempfile.TemporaryDirectory(prefix='.partial-', dir=place):
             pass
     except OSError as error:
         raise OutputError(
-            f'{target} cannot be made: {place} takes nothing ({error.strerror})'
+            f'{target} cannot be created: {place} takes nothing ({error.strerror})'
         ) from error
 
 

@@ -101,7 +101,7 @@ def test_taken_folder_is_refused_and_kept(tmp_path: Path) -> None:
 def test_a_folder_that_nothing_can_be_made_in_is_refused_beforehand(tmp_path: Path) -> None:
     (tmp_path / 'file').touch()
     for place in (tmp_path / 'file' / 'out', Path('/proc/out')):
-        with pytest.raises(OutputError, match=f'{place} cannot be made'):
+        with pytest.raises(OutputError, match=f'{place} cannot be created'):
             require_free_directory(place)
     require_free_directory(tmp_path / 'new' / 'newer')
     assert [path.name for path in tmp_path.iterdir()] == ['file']

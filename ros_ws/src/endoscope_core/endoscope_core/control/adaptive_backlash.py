@@ -141,7 +141,6 @@ class AdaptiveBacklashJoint:
     def learn(
         self, error: float, correction: float, desired: float, direction: float, dt: float
     ) -> None:
-        """One step of the adaptive laws; see `JointLaw`."""
         self.state = adapt(self.settings, self.state, error, desired, direction, dt)
 
     def correction(self, desired: float, direction: float, dt: float) -> float:

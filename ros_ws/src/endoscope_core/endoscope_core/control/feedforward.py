@@ -60,16 +60,13 @@ class Passing:
 
     @property
     def direction(self) -> float:
-        """Which way the desired motion has taken."""
         return self._direction
 
     def begin(self, direction: float, desired: float, velocity: float) -> float:
-        """Start; the desired angle is wanted."""
         self._direction, self._desired = direction, desired
         return desired
 
     def wanted(self, desired: float, velocity: float, dt: float) -> float:
-        """The desired angle."""
         moved = desired - self._desired
         self._direction = float(dahl_step(self._direction, moved, self._travel, 1.0))
         self._desired = desired
@@ -94,7 +91,6 @@ class HysteresisInverse:
 
     @property
     def direction(self) -> float:
-        """Which way the desired motion has taken."""
         return self._inverse.direction
 
     def begin(self, direction: float, desired: float, velocity: float) -> float:
@@ -104,7 +100,6 @@ class HysteresisInverse:
         return self._inverse.command()
 
     def wanted(self, desired: float, velocity: float, dt: float) -> float:
-        """Command of the inverse."""
         self._inverse.move_to(self._foreseen.follow(desired + self._lead * velocity))
         return self._inverse.command()
 

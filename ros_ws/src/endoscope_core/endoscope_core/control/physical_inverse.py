@@ -116,7 +116,7 @@ class AdaptivePhysicalInverse(PhysicalInverse):
         self._learning = PlantLearning(parameters, self.limits.gear, settings=learning)
 
     def begin(self, direction: float, desired: float, velocity: float) -> float:
-        """Start anew with what was learnt; return the command wanted now (rad)."""
+        """Start again with what was learnt; return the command wanted now (rad)."""
         self.parameters = self._learning.parameters
         wanted = super().begin(direction, desired, velocity)
         self._learning = PlantLearning(

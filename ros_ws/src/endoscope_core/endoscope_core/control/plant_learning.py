@@ -36,7 +36,7 @@ LEARNT = {
 """What is learnt, and the standard deviation of its logarithm before anything was measured."""
 
 NOTABLE = 2e-3
-"""Change of the logarithm of a parameter for which the models are set up anew."""
+"""Change of the logarithm of a parameter for which the models are set up again."""
 
 _BENT_ANEW = 0.7
 """Standard deviation of the logarithm of the capstan exponent once the tube was bent."""

@@ -73,7 +73,6 @@ class RecursiveHysteresisJoint:
     def learn(
         self, error: float, correction: float, desired: float, direction: float, dt: float
     ) -> None:
-        """One measurement; see `JointLaw`."""
         c = self.settings
         if abs(direction) < c.settled:
             return

@@ -218,11 +218,9 @@ class BoucWenParameters(NamedNumbers, ConstantLag):
         return 0.0
 
     def memory_step(self, y: float, delta: float, angle: float) -> float:
-        """``h / h_max`` after a move by `delta` rad to `angle`."""
         return float(bouc_wen_normalised_step(y, delta, self.travel, self.rho, self.n))
 
     def memory_path(self, driver: NDArray[np.float64], y0: float) -> NDArray[np.float64]:
-        """``h / h_max`` (N,) along a driving angle (N,) in rad."""
         states: NDArray[np.float64] = bouc_wen_normalised_path(
             driver, y0, self.travel, self.rho, self.n
         )
@@ -301,7 +299,6 @@ class AsymmetricBoucWenParameters(NamedNumbers):
         return (1.0 + abs(self.skew) + widest * steepest) / self.alpha
 
     def memory_step(self, y: float, delta: float, angle: float) -> float:
-        """State after a move by `delta` rad to `angle`."""
         if delta >= 0.0:
             shape = self.travel_up, self.rho_up, self.n_up
         else:
@@ -309,7 +306,6 @@ class AsymmetricBoucWenParameters(NamedNumbers):
         return float(bouc_wen_normalised_step(y, delta, *shape))
 
     def memory_path(self, driver: NDArray[np.float64], y0: float) -> NDArray[np.float64]:
-        """States (N,) along a driving angle (N,) in rad."""
         states: NDArray[np.float64] = asymmetric_path(
             driver,
             y0,
@@ -324,7 +320,6 @@ class AsymmetricBoucWenParameters(NamedNumbers):
         return max(0.0, self.lag + self.skew * bounded)
 
     def lags_at(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The same for many angles (N,)."""
         bounded = np.clip(angles, -GREATEST_ANGLE, GREATEST_ANGLE)
         lags: NDArray[np.float64] = np.maximum(0.0, self.lag + self.skew * bounded)
         return lags

@@ -120,11 +120,9 @@ class DahlParameters(NamedNumbers, ConstantLag):
         return (1.0 + 2.0**self.exponent * self.lag / self.travel) / self.alpha
 
     def memory_step(self, y: float, delta: float, angle: float) -> float:
-        """State after a move by `delta` rad to `angle`."""
         return float(dahl_step(y, delta, self.travel, self.exponent))
 
     def memory_path(self, driver: NDArray[np.float64], y0: float) -> NDArray[np.float64]:
-        """States (N,) along a driving angle (N,) in rad."""
         states: NDArray[np.float64] = dahl_path(driver, y0, self.travel, self.exponent)
         return states
 
@@ -161,10 +159,8 @@ class PlayParameters(NamedNumbers, ConstantLag):
         return (1.0 + self.lag / self.travel) / self.alpha
 
     def memory_step(self, y: float, delta: float, angle: float) -> float:
-        """State after a move by `delta` rad to `angle`."""
         return float(play_step(y, delta, self.travel))
 
     def memory_path(self, driver: NDArray[np.float64], y0: float) -> NDArray[np.float64]:
-        """States (N,) along a driving angle (N,) in rad."""
         states: NDArray[np.float64] = play_path(driver, y0, self.travel)
         return states

@@ -61,7 +61,6 @@ class DirectInverse:
 
     @property
     def direction(self) -> float:
-        """The memory."""
         return self._memory
 
     def command(self) -> float:
@@ -71,7 +70,6 @@ class DirectInverse:
         return (self._angle - model.offset + lag) / model.alpha
 
     def move_to(self, angle: float) -> None:
-        """Follow the desired angle."""
         self._memory = self._model.memory_step(self._memory, angle - self._angle, angle)
         self._angle = angle
 
@@ -101,7 +99,6 @@ class PlayStackInverse:
         return float(self._weights @ self._plays)
 
     def move_to(self, angle: float) -> None:
-        """Follow the desired angle."""
         self._angle = angle - self._offset
         self._plays = advance_plays(self._thresholds, self._plays, self._angle)
 

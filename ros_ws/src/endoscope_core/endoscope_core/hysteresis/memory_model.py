@@ -83,11 +83,9 @@ class ConstantLag:
     """One `lag` of a `MemoryModel`: a saturated loop's half-width along the actual angle, rad."""
 
     def lag_at(self: _WithLag, angle: float) -> float:
-        """Half-width of the loop, rad."""
         return self.lag
 
     def lags_at(self: _WithLag, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The same for many angles (N,)."""
         return np.full(angles.shape, self.lag)
 
 

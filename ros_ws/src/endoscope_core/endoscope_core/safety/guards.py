@@ -72,7 +72,7 @@ class StandingStill:
         self.restart()
 
     def restart(self) -> None:
-        """Begin anew, as where nothing is commanded."""
+        """Begin again, as where nothing is commanded."""
         self._rest: list[float] = []
         self._goal_at_rest: list[float] = []
         self._told_ns: list[int | None] = []

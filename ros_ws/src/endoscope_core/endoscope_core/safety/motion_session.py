@@ -13,7 +13,7 @@ HEARTBEAT_S = 0.05
 SILENCE_NS = 150_000_000
 # A loop that stood still for longer than commands live has neither heard nor watched anything.
 STALL_NS = 100_000_000
-# What a loop did not hear because it came late itself is no silence of the supervisor, up to this:
+# What a loop that came late did not hear is not a silence of the supervisor, up to this:
 # a node that turns every 40 ms still leaves within 0.2 s.
 _LENIENCE_NS = 40_000_000
 _USUAL_TURN_NS = 40_000_000
