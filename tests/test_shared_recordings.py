@@ -8,16 +8,15 @@ from rosbags.highlevel import AnyReader
 from endoscope_bags import open_bag
 from endoscope_bags.information import bag_information
 
-RECORDINGS = sorted(CASES.glob('*.second.mcap'))
+RECORDINGS = sorted(CASES.glob('**/*.second.mcap'))
 TOPICS = (
-    'slave/servo_jp',
     'motor/servo_jp',
     'motor/measured_js',
     'wires/measured_js',
     'slave/measured_js',
 )
 
-pytestmark = needs(CASES)
+pytestmark = needs(RECORDINGS[0] if RECORDINGS else CASES / 'second.mcap')
 
 
 @pytest.mark.parametrize('path', RECORDINGS[:3], ids=lambda path: path.stem)
@@ -50,5 +49,5 @@ def test_every_recording_opens_and_has_what_analysis_needs(path):
         assert len(series) > 100
         assert (np.diff(series.stamp_ns) > 0).all()
     information = bag_information(bag)
-    assert information.duration_s == pytest.approx(12, abs=0.1)
+    assert information.duration_s > 10.0
     assert all(topic.lost is None for topic in information.topics)
