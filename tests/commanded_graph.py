@@ -30,7 +30,7 @@ class Sender:
     def __init__(self, graph, topic, names=JOINTS, qos=COMMAND):
         self._graph = graph
         self._names = names
-        self._publisher = graph.speak(JointState, topic, qos)
+        self.publisher = graph.speak(JointState, topic, qos)
 
     def send(self, position, session=None, ahead_ns=0, **fields):
         message = JointState(name=list(self._names), position=list(position))
@@ -39,7 +39,7 @@ class Sender:
         message.header.frame_id = self._graph.session if session is None else session
         for field, value in fields.items():
             setattr(message, field, value)
-        self._publisher.publish(message)
+        self.publisher.publish(message)
 
 
 class ForeignConsole(Sender):
@@ -47,35 +47,35 @@ class ForeignConsole(Sender):
 
     def __init__(self, graph):
         super().__init__(graph, SLAVE_COMMAND)
-        self._clutch = graph.speak(Joy, MASTER_CLUTCH, EVENT)
-        self._sent = 0
+        self.clutch_publisher = graph.speak(Joy, MASTER_CLUTCH, EVENT)
+        self.sent = 0
         self.clutch = 1
-        self._start = graph.nodes['compensator']._pose.bending()
-        self._way = 0.0
-        self._towards = -1.0 if self._start[0] > 0.0 else 1.0
+        self.start = graph.nodes['compensator']._pose.bending()
+        self.way = 0.0
+        self.towards = -1.0 if self.start[0] > 0.0 else 1.0
 
     @property
     def angle(self):
         """What it asks for, rad, from where the slave is at first."""
-        return [start + self._way for start in self._start]
+        return [start + self.way for start in self.start]
 
     def tick(self, position=None, **changes):
-        if self._sent % 50 == 0 and self.clutch is not None:
-            self._clutch.publish(Joy(buttons=[self.clutch]))
+        if self.sent % 50 == 0 and self.clutch is not None:
+            self.clutch_publisher.publish(Joy(buttons=[self.clutch]))
             self._graph.advance(TICK_S)
-        self._sent += 1
+        self.sent += 1
         self.send(self.angle if position is None else position, **changes)
         self._graph.advance(TICK_S)
 
     def hold(self, clutch):
         self.clutch = clutch
-        self._clutch.publish(Joy(buttons=[clutch]))
+        self.clutch_publisher.publish(Joy(buttons=[clutch]))
         self._graph.advance(TICK_S)
 
     def move(self, ticks, speed=0.5):
         for _ in range(ticks):
-            self._way += TICK_S * speed * self._towards
-            self.tick(velocity=[speed * self._towards] * 2)
+            self.way += TICK_S * speed * self.towards
+            self.tick(velocity=[speed * self.towards] * 2)
 
 
 class Handle(Sender):
@@ -83,7 +83,7 @@ class Handle(Sender):
 
     def __init__(self, graph, rate=200):
         super().__init__(graph, MASTER_MEASURED, qos=SENSOR_OFFERED)
-        self._clutch = graph.speak(Joy, MASTER_CLUTCH, EVENT)
+        self.clutch_publisher = graph.speak(Joy, MASTER_CLUTCH, EVENT)
         self.rate = rate
         self._count = 0
         self.angle = np.array([0.5, -0.3])
@@ -94,7 +94,7 @@ class Handle(Sender):
             if alive:
                 self.send(self.angle, session='')
             if alive and self._count % (self.rate // 10) == 0:
-                self._clutch.publish(Joy(buttons=[int(clutch)]))
+                self.clutch_publisher.publish(Joy(buttons=[int(clutch)]))
             self._count += 1
             self._graph.advance(1.0 / self.rate)
 
@@ -152,7 +152,7 @@ def console(foreign):
     foreign.enable()
     console = ForeignConsole(foreign)
     yield console
-    foreign.probe.destroy_publisher(console._publisher)
-    foreign.probe.destroy_publisher(console._clutch)
+    foreign.probe.destroy_publisher(console.publisher)
+    foreign.probe.destroy_publisher(console.clutch_publisher)
     foreign.command('disable')
     foreign.advance(0.1)

@@ -164,7 +164,7 @@ def test_a_tracker_whose_frames_come_late_for_good_is_timed_anew(tracker, emulat
     collect(tracker, 20)
     begun = time.monotonic()
     # The tracker stops for a third of a second and counts on from where it was.
-    emulator.unit._now = lambda: max(begun, time.monotonic() - 0.3)
+    emulator.unit.now = lambda: max(begun, time.monotonic() - 0.3)
     tracker.take()
     until(lambda: figure(tracker, 'late') > 20)
     collect(tracker, 5)
@@ -200,11 +200,11 @@ def test_a_tracker_that_counts_its_frames_anew_is_opened_again(tracker, emulator
     until(lambda: [r for r in tracker.take() if r.frame > 20])
     # It counts on so slowly that it does not come to where it was before that is noticed.
     begun, now = unit.frame_zero + 0.1, time.monotonic()
-    unit._now = lambda: begun + 1e-3 * (time.monotonic() - now)
+    unit.now = lambda: begun + 1e-3 * (time.monotonic() - now)
     until(lambda: figure(tracker, 'connections') >= 2)
     assert figure(tracker, 'old frames') >= 3
-    counted = unit._now() - unit.frame_zero
-    unit._now, unit.frame_zero = time.monotonic, time.monotonic() - counted
+    counted = unit.now() - unit.frame_zero
+    unit.now, unit.frame_zero = time.monotonic, time.monotonic() - counted
     tracker.take()
     collect(tracker, 5)
     until(lambda: tracker.health()[0] == '')
@@ -342,7 +342,7 @@ def test_no_wrong_value_in_10000_spoilt_replies(tmp_path):
             port.ask(command)
         # A fresh frame each time, so that an earlier reply cannot pass for this one.
         ticks = iter(range(10**6))
-        emulator.unit._now = lambda: emulator.unit.frame_zero + next(ticks) / 40.0 + 0.01
+        emulator.unit.now = lambda: emulator.unit.frame_zero + next(ticks) / 40.0 + 0.01
         emulator.tap = spoil
         while refused + same < 10_000:
             try:

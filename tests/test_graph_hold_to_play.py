@@ -20,11 +20,11 @@ class Hand:
 
     def __init__(self, graph):
         self._graph = graph
-        self._clutch = graph.speak(Joy, MASTER_CLUTCH, EVENT)
+        self.clutch_publisher = graph.speak(Joy, MASTER_CLUTCH, EVENT)
 
     def says(self, held, seconds):
         for _ in range(round(10 * seconds)):
-            self._clutch.publish(Joy(buttons=[int(held)]))
+            self.clutch_publisher.publish(Joy(buttons=[int(held)]))
             self._graph.advance(0.1)
 
 
@@ -46,7 +46,7 @@ def hand(graph):
     graph.set('console', source='file')
     yield hand
     graph.set('console', source='none')
-    graph.probe.destroy_publisher(hand._clutch)
+    graph.probe.destroy_publisher(hand.clutch_publisher)
     graph.connect()
 
 

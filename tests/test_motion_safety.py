@@ -141,16 +141,16 @@ def test_the_order_of_the_joints_does_not_matter(foreign, console):
     console.move(20)
     x, y = console.angle
     # Onwards: at a reversal the feed-forward crosses the backlash.
-    console.tick([y + console._towards * TICK_S, x], name=['bend_y', 'bend_x'])
+    console.tick([y + console.towards * TICK_S, x], name=['bend_y', 'bend_x'])
     steps = np.subtract(moved.goals[-1].position, moved.goals[-2].position)
-    assert steps[1] * console._towards > steps[0] * console._towards
+    assert steps[1] * console.towards > steps[0] * console.towards
 
 
 def test_a_step_is_refused_and_ends_the_session(foreign, console):
     console.move(200)
     moved = Moved(foreign)
     for _ in range(300):
-        console.tick([1.4 * console._towards] * 2)
+        console.tick([1.4 * console.towards] * 2)
     assert foreign.state == 'FAULT'
     assert foreign.nodes['compensator'].gate.refused['too fast']
     assert 'slave/servo_jp ended while the clutch was held (too far' in foreign.cause
@@ -160,7 +160,7 @@ def test_a_step_is_refused_and_ends_the_session(foreign, console):
 
 def test_a_first_command_far_from_the_measured_pose_moves_nothing(foreign, console):
     moved = Moved(foreign)
-    console._way = 0.3
+    console.way = 0.3
     for _ in range(300):
         console.tick()
     assert moved.goals == []
@@ -172,7 +172,7 @@ def test_stamps_that_run_ahead_stretch_no_allowance(foreign, console):
     moved = Moved(foreign)
     speed = RIG.joints.speed
     for k in range(200):
-        console._way = console._towards * min(1.0, abs(console._way) + 0.02 * speed)
+        console.way = console.towards * min(1.0, abs(console.way) + 0.02 * speed)
         console.tick(ahead_ns=k * 20_000_000)
     assert moved.largest_step < BOUND
     assert foreign.nodes['compensator'].gate.refused['too fast']
@@ -186,7 +186,7 @@ def test_enabling_anew_clears_what_a_stamp_from_the_future_left(foreign, console
     foreign.advance(0.2)
     foreign.enable()
     corrections = foreign.listen(CORRECTION)
-    console._start, console._way = foreign.nodes['compensator']._pose.bending(), 0.0
+    console.start, console.way = foreign.nodes['compensator']._pose.bending(), 0.0
     console.move(600)
     assert len(corrections) > 1.1 * TICK_RATE
     assert foreign.diagnostics['controller: feedback'][-1].message == 'in the loop'
@@ -284,23 +284,23 @@ def test_motors_that_stand_still_under_commands_are_a_fault(foreign, console):
         if foreign.state == 'FAULT':
             break
     # 13 counts are told within 0.1 s, which is looked at each 0.04 s; 0.3 s are waited for.
-    assert 0.3 <= console._sent / TICK_RATE <= 0.6
+    assert 0.3 <= console.sent / TICK_RATE <= 0.6
     assert 'motor_x stands still: its goal has gone' in foreign.cause
 
 
 def test_commands_that_are_refused_while_the_clutch_is_held_are_a_fault_and_said(foreign, console):
     moved = Moved(foreign)
-    console._way = 0.3
-    while foreign.state == 'ENABLED' and console._sent < TICK_RATE:
+    console.way = 0.3
+    while foreign.state == 'ENABLED' and console.sent < TICK_RATE:
         console.tick()
-    assert 0.3 <= console._sent / TICK_RATE <= 0.4
+    assert 0.3 <= console.sent / TICK_RATE <= 0.4
     assert 'slave/servo_jp: ' in foreign.cause
     assert 'commands are refused, last: too far from the measured position' in foreign.cause
     foreign.command('disable')
     foreign.advance(0.2)
     foreign.enable()
     assert moved.goals == []
-    console._way = 0.0
+    console.way = 0.0
     console.move(100)
     assert foreign.state == 'ENABLED'
     assert len(moved.goals) > 50
@@ -430,7 +430,7 @@ def test_a_handle_that_falls_silent_stands_and_is_taken_up_where_the_slave_is():
         handle = Handle(graph)
         handle.move(1.0, (0.5, 0.5))
         moved = Moved(graph)
-        clutch = handle._clutch
+        clutch = handle.clutch_publisher
         for _ in range(10):
             clutch.publish(Joy(buttons=[1]))
             graph.advance(0.05)

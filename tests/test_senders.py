@@ -88,7 +88,7 @@ def test_two_senders_of_a_motion_topic_are_a_fault_that_names_both():
             assert '/endoscope/probe' in graph.cause
             assert graph.cause.count('/endoscope/') >= 2
             assert graph.command('enable') == 'FAULT'
-            graph.probe.destroy_publisher(rival._publisher)
+            graph.probe.destroy_publisher(rival.publisher)
             graph.advance(0.3)
             assert graph.command('enable') == 'ENABLED'
             graph.advance(0.5)
@@ -184,8 +184,8 @@ def test_a_handle_that_outlives_its_sender_is_not_followed(foreign):
     leave_behind(foreign, console, MASTER_MEASURED, message, SENSOR_OFFERED)
     handle.move(0.1, clutch=False)
     del console._handle.take
-    foreign.probe.destroy_publisher(handle._publisher)
-    foreign.probe.destroy_publisher(handle._clutch)
+    foreign.probe.destroy_publisher(handle.publisher)
+    foreign.probe.destroy_publisher(handle.clutch_publisher)
     assert taken
     assert (0.9, 0.9) not in taken
     assert foreign.state == 'FAULT'

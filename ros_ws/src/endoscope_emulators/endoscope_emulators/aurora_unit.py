@@ -92,7 +92,7 @@ class AuroraUnit:
         self, sources: Sequence[SensorSource], now: Callable[[], float], latency: float = 0.0
     ) -> None:
         self._sources = tuple(sources)
-        self._now = now  # monotonic time in s
+        self.now = now  # monotonic time in s
         self._latency = latency  # s from measuring a frame to having it ready
         self._ports: dict[int, _Port] = {}
         self._mode = _Mode.RESET
@@ -104,7 +104,7 @@ class AuroraUnit:
         """Start anew, as after power-up, a serial break or RESET; what it then says."""
         self._mode = _Mode.RESET
         self._ports = {}
-        self.frame_zero = self._now()
+        self.frame_zero = self.now()
         self.baud = BAUD_RATES[0]
         return sealed('RESET')
 
@@ -246,7 +246,7 @@ class AuroraUnit:
             raise _Refusal(_OUT_OF_RANGE)
         self._mode = _Mode.TRACKING
         if parameters == '80':
-            self.frame_zero = self._now()
+            self.frame_zero = self.now()
         self._frame = _Frame()
         return 'OKAY'
 
@@ -261,7 +261,7 @@ class AuroraUnit:
         wanted = _hexadecimal(options or '0001')
         if not wanted & _TRANSFORMS or wanted & ~(_TRANSFORMS | _NOT_NORMALLY_REPORTED):
             raise _Refusal(_OUT_OF_RANGE)
-        ready = self._now() - self.frame_zero - self._latency
+        ready = self.now() - self.frame_zero - self._latency
         number = math.floor(ready * FRAME_RATE)
         if number != self._frame.number:
             # Before the first frame is ready no sensor has been seen yet.
