@@ -17,8 +17,8 @@ from endoscope_core.physics import (
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.folds import folded
 from endoscope_core.physics.functions import FUNCTIONS
-from endoscope_core.physics.functions.interpolation import NODES, VALUES, function_at
-from endoscope_core.physics.functions.place import Shape
+from endoscope_core.physics.functions.evaluation import function_at
+from endoscope_core.physics.functions.places import NODES, VALUES, Shape
 from endoscope_core.physics.functions.term import tabulated
 from endoscope_core.physics.hooks import HOOKS, LOAD
 from endoscope_core.physics.packing import pack, rest_state

@@ -15,7 +15,7 @@ from endoscope_core.physics import (
     save_plant,
 )
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_core.physics.functions.interpolation import NODES
+from endoscope_core.physics.functions.places import NODES
 from endoscope_core.physics.plant_numbers import NUMBERS
 
 

@@ -24,9 +24,9 @@ from endoscope_core.physics.on_stamps import (
     AnswerStamps,
     answer_commands,
 )
+from endoscope_core.physics.packing import recording_faults
 from endoscope_core.physics.plant_file import JOINT_NAMES
-from endoscope_core.physics.recording import recording_faults
-from endoscope_core.physics.samples import TOPICS
+from endoscope_core.physics.sensing import TOPICS
 from endoscope_core.physics.simulator import TICK
 from endoscope_core.rig import Rig
 from endoscope_explain.recording import (

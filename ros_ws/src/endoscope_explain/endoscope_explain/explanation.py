@@ -12,7 +12,7 @@ from endoscope_core.physics.description import PlantDescription, TermSpec
 from endoscope_core.physics.effect import Effect
 from endoscope_core.physics.effects import describe
 from endoscope_core.physics.functions import FUNCTIONS
-from endoscope_core.physics.functions.place import Place
+from endoscope_core.physics.functions.places import Place
 
 Array = NDArray[np.float64]
 

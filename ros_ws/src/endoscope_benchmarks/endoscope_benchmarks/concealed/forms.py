@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from endoscope_core.physics import PlantDescription, TermSpec
 from endoscope_core.physics.functions import FUNCTIONS, places
 from endoscope_core.physics.functions.expression import evaluate
-from endoscope_core.physics.functions.place import Argument, Place, Shape
+from endoscope_core.physics.functions.places import Argument, Place, Shape
 from endoscope_core.physics.functions.term import tabulated
 from endoscope_core.physics.kernel import run_joints
 from endoscope_core.physics.layout import (

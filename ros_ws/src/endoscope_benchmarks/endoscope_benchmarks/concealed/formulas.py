@@ -8,7 +8,7 @@ import numpy as np
 from endoscope_core.physics import EffectSpec
 from endoscope_core.physics.effect import Effect, Parameter
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_core.physics.effects.onset import STARTS
+from endoscope_core.physics.effects.laws import ONSETS
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.places import OTHER_ANGLE
 
@@ -76,7 +76,7 @@ def _setting(generator: np.random.Generator, parameter: Parameter, duration: flo
         return float(generator.integers(int(parameter.low), int(parameter.high) + 1))
     if parameter.phase:
         return float(generator.uniform(-math.pi, math.pi))
-    if parameter.starts == STARTS:
+    if parameter.starts == ONSETS:
         return float(generator.uniform(*_WITHIN) * duration)
     values = np.array([*parameter.starts, parameter.typical])
     sizes = np.abs(values)

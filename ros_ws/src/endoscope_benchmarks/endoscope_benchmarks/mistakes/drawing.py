@@ -10,7 +10,7 @@ from endoscope_core.physics.description import EffectSpec, JointParameters, Plan
 from endoscope_core.physics.effect import Effect
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.family import MOST_BENT, shipped_family
-from endoscope_core.physics.recording import recording_faults
+from endoscope_core.physics.packing import recording_faults
 from endoscope_core.physics.sensing import SensorModel
 from endoscope_core.physics.simulator import TICK, simulate
 from endoscope_core.rig import shipped_rig

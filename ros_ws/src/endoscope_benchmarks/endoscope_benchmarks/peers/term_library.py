@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 from endoscope_benchmarks.peers.problem import PERIOD_S, SIGNALS, Problem
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
-from endoscope_core.physics.functions.place import Place, Shape
+from endoscope_core.physics.functions.places import Place, Shape
 
 Array = NDArray[np.float64]
 

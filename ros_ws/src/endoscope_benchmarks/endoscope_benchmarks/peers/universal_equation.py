@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from endoscope_benchmarks.concealed.judge import Statement
 from endoscope_benchmarks.peers.problem import OwnExample, Problem, is_held_out, predicts
-from endoscope_core.physics.functions.interpolation import NODES, VALUES
+from endoscope_core.physics.functions.places import NODES, VALUES
 from endoscope_explain.search.screen import Background, background, directions
 from endoscope_explain.search.term import Term, functions
 

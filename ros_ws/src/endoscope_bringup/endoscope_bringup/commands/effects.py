@@ -9,7 +9,7 @@ from endoscope_bringup.subcommands import add_json_option, print_json
 
 if TYPE_CHECKING:
     from endoscope_core.physics.effect import Effect, Parameter
-    from endoscope_core.physics.functions.place import Place
+    from endoscope_core.physics.functions.places import Place
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -78,8 +78,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _print_plant(as_json: bool) -> int:
     from endoscope_core.physics import PlantDescription
-    from endoscope_core.physics.nominal_plant_file import nominal_plant_text
-    from endoscope_core.physics.plant_file import plant_to_mapping
+    from endoscope_core.physics.plant_file import nominal_plant_text, plant_to_mapping
 
     if as_json:
         print_json(plant_to_mapping(PlantDescription()))

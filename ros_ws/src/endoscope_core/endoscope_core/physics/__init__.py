@@ -7,10 +7,9 @@ from endoscope_core.physics.description import (
     SensorParameters,
     TermSpec,
 )
+from endoscope_core.physics.packing import recording_faults
 from endoscope_core.physics.plant_file import load_plant, save_plant
-from endoscope_core.physics.recording import recording_faults
-from endoscope_core.physics.samples import RecordingFaults
-from endoscope_core.physics.sensing import SensorModel
+from endoscope_core.physics.sensing import RecordingFaults, SensorModel
 from endoscope_core.physics.simulator import (
     PlantSample,
     PlantSimulator,

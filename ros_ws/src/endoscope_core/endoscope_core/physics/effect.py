@@ -1,6 +1,8 @@
 """What an effect is: its parameters, equation, source, place, and what a search must know of it."""
 
+import importlib
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -145,6 +147,10 @@ class Effect:
     def _block(self) -> int:
         return SLOTS.parameter_block(len(self.parameters))
 
+    def __reduce__(self) -> tuple[Callable[[str], 'Effect'], tuple[str]]:
+        # By its id: a process that it is sent to has it already, with its compiled functions.
+        return _defined, (self.id,)
+
     @property
     def places(self) -> range:
         """Indices of its parameters in the compiled physics' parameter array."""
@@ -168,6 +174,12 @@ class NominalPhysics(Effect):
 
 
 _DEFINED: dict[str, Effect] = {}
+
+
+def _defined(effect_id: str) -> Effect:
+    for room in ('effects', 'functions'):
+        importlib.import_module(f'endoscope_core.physics.{room}')
+    return _DEFINED[effect_id]
 
 
 def in_order_of_chain[Kind: Effect](kind: type[Kind]) -> dict[str, Kind]:

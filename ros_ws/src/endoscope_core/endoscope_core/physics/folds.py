@@ -7,6 +7,7 @@ holds the compiled cache. The functions of all places are the same few compiled 
 """
 
 import importlib.util
+import inspect
 import sys
 from collections.abc import Iterable, Sequence
 from types import ModuleType
@@ -16,16 +17,15 @@ from endoscope_core.compiled import SOURCES, cache_folder
 from endoscope_core.physics.effect import Effect
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
-from endoscope_core.physics.functions.places import KEPT_UP
-from endoscope_core.physics.functions.summation import MOST, ROWS, Row
+from endoscope_core.physics.functions.evaluation import MOST, ROWS, Row
+from endoscope_core.physics.functions.places import Place
 from endoscope_core.physics.hooks import HOOKS, LINKS, Fold, Function, Hook
 
 _NAME = 'endoscope_folds'
 _IMPORTS = """import math
 
 from endoscope_core.compiled import compiled
-from endoscope_core.physics.functions.acting import functions_act
-from endoscope_core.physics.functions.summation import sum_of_functions"""
+from endoscope_core.physics.functions.evaluation import functions_act, sum_of_functions"""
 
 
 def source() -> str:
@@ -43,7 +43,8 @@ def source() -> str:
         if rows:
             functions.append(_functions(hook, rows))
         functions.append(_function(hook, names, rows))
-    follow = [place for place in FUNCTIONS.values() if place.at in KEPT_UP or place.argument.lags]
+    imports += sorted({line for row in ROWS for place in row[1] for line in _imports(place)})
+    follow = [place for place in FUNCTIONS.values() if place.argument.follows]
     functions.append(_test('functions_follow', (), follow))
     return '\n'.join(imports) + '\n' + ''.join(functions)
 
@@ -90,19 +91,33 @@ def _functions(hook: Hook, rows: list[Row]) -> str:
     lines = [f'\n\n@compiled\ndef {hook.name}_functions(on, {hook.arguments}):']
     lines.append('    r0, r1, m0, m1 = 0.0, 0.0, 1.0, 0.0')
     for number, places in rows:
-        arguments = [place.at for place in places] + ['0.0'] * (MOST - len(places))
+        arguments = [_call(place.at) for place in places] + ['0.0'] * (MOST - len(places))
         given = f'on, p, {float(number)}, {float(len(places))}, {", ".join(arguments)}'
-        only = f'{places[0].only} and ' if places[0].only else ''
+        only = '' if places[0].cell is None else f'cell == {places[0].cell} and '
         lines.append(f'    if {only}({_any_of(places)}):')
         lines.append(f'        value, slope, factor, steep = sum_of_functions({given})')
-        lines.append(f'        r0 += {places[0].sign or "1.0"} * value')
-        if places[0].by_step:
-            lines.append(f'        r1 -= {places[0].by_step} * slope')
-            lines.append(f'        m1 = m1 * factor + m0 * {places[0].by_step} * steep')
+        sign, by_step = places[0].sign, places[0].by_step
+        lines.append(f'        r0 += {_call(sign) if sign else "1.0"} * value')
+        if by_step:
+            lines.append(f'        r1 -= {_call(by_step)} * slope')
+            lines.append(f'        m1 = m1 * factor + m0 * {_call(by_step)} * steep')
         lines.append('        m0 *= factor')
     given = 'math.exp(r0 * m0)' if hook.fold is Fold.FACTORS else 'r0 * m0'
     lines.append(f'    return {given}' + (', r1 * m0 - r0 * m1' if hook.results == 2 else ''))
     return '\n'.join(lines) + '\n'
+
+
+def _imports(place: Place) -> list[str]:
+    """Lines that import the functions of a place."""
+    functions = [f for f in (place.at, place.sign, place.by_step) if f and not isinstance(f, str)]
+    return [f'from {f.__module__} import {f.__name__}' for f in functions]
+
+
+def _call(function: Function | str) -> str:
+    """Source of a call with those of a hook's arguments that a function takes, by their names."""
+    if isinstance(function, str):
+        return function
+    return f'{function.__name__}({", ".join(inspect.signature(function).parameters)})'
 
 
 def _test(name: str, effects: Iterable[Effect], places: Sequence[Effect]) -> str:
@@ -151,6 +166,6 @@ def acting(hook: Hook) -> Function:
 
 
 def follow() -> Function:
-    """Compiled function of the flags: whether functions depend on the states `KEPT_UP`."""
+    """Compiled function of the flags: whether a state has to be advanced for functions alone."""
     function: Function = _MODULE.functions_follow
     return function

@@ -12,7 +12,7 @@ from enum import StrEnum
 from typing import Any
 
 from endoscope_core.physics.effect import Effect
-from endoscope_core.physics.samples import RecordingFaults
+from endoscope_core.physics.sensing import RecordingFaults
 
 
 class Fold(StrEnum):

@@ -13,7 +13,7 @@ from endoscope_core.compiled import Array, Flags, compiled
 from endoscope_core.physics import hooks
 from endoscope_core.physics.folds import acting, folded, follow
 from endoscope_core.physics.functions import FUNCTIONS
-from endoscope_core.physics.functions.interpolation import LAG
+from endoscope_core.physics.functions.places import LAG
 from endoscope_core.physics.joint import bend, secant_stiffness
 from endoscope_core.physics.layout import (
     ANGLE_HISTORY,

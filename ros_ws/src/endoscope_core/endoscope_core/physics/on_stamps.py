@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
-from endoscope_core.physics.recording import recording_faults
+from endoscope_core.physics.packing import recording_faults
 from endoscope_core.physics.simulator import TICK, PlantTrajectory, simulate
 
 Stamps = NDArray[np.int64]

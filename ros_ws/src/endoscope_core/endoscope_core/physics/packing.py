@@ -1,5 +1,6 @@
-"""From a plant description to the flat arrays that the compiled physics works on."""
+"""From a plant description to the compiled physics' flat arrays, and to a recording's faults."""
 
+import functools
 import math
 from dataclasses import replace
 
@@ -16,8 +17,9 @@ from endoscope_core.physics.description import (
 from endoscope_core.physics.effect import NominalPhysics, UnknownEffectError
 from endoscope_core.physics.effects import CATALOGUE, NOMINAL_PHYSICS, describe
 from endoscope_core.physics.functions import FUNCTIONS, describe_place
-from endoscope_core.physics.functions.acting import ADDS, FLAGS_OF_FUNCTIONS, MULTIPLIES
+from endoscope_core.physics.functions.evaluation import ADDS, FLAGS_OF_FUNCTIONS, MULTIPLIES
 from endoscope_core.physics.functions.term import tabulated
+from endoscope_core.physics.hooks import ON_SAMPLES
 from endoscope_core.physics.kernel import settle, turn_to
 from endoscope_core.physics.layout import (
     CELLS,
@@ -29,6 +31,7 @@ from endoscope_core.physics.layout import (
     SHEATH_ROWS,
     SLOTS,
 )
+from endoscope_core.physics.sensing import RecordingFaults
 
 
 def with_nominal_in_place(plant: PlantDescription) -> PlantDescription:
@@ -132,6 +135,24 @@ def _check_products(terms: tuple[TermSpec, ...]) -> None:
                 f'unknown_term at {term.place} on joint {term.joint} multiplies nothing: add the '
                 'unknown_term that it multiplies, or leave out multiplies'
             )
+
+
+def recording_faults(plant: PlantDescription) -> RecordingFaults:
+    """The faults that a plant's effects give to its recordings.
+
+    Raises
+    ------
+    ValueError
+        If an effect is invalid, or its joints disagree about the tracker's one clock.
+    """
+    joints = plant.joint_names()
+    parts = []
+    for spec in plant.effects:
+        effect, values = describe(spec.id), effect_values(spec)
+        if spec.id in ON_SAMPLES:
+            named = {p.name: float(v) for p, v in zip(effect.parameters, values, strict=True)}
+            parts.append(ON_SAMPLES[spec.id](named, joints.index(spec.joint)))
+    return functools.reduce(RecordingFaults.joined, parts, RecordingFaults())
 
 
 def _nominal(joint: JointParameters) -> list[float]:

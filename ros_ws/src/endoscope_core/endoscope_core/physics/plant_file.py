@@ -18,9 +18,8 @@ from endoscope_core.physics.description import (
     TermSpec,
 )
 from endoscope_core.physics.functions import FUNCTIONS, describe_place
-from endoscope_core.physics.packing import with_nominal_in_place
+from endoscope_core.physics.packing import recording_faults, with_nominal_in_place
 from endoscope_core.physics.plant_numbers import NUMBERS
-from endoscope_core.physics.recording import recording_faults
 from endoscope_core.schema import Before, Number, blamed_on, load_yaml, read, within
 
 UNKNOWN_TERM = 'unknown_term'
@@ -187,3 +186,31 @@ def save_plant(plant: PlantDescription, path: str | Path) -> None:
         If the file cannot be written.
     """
     write_text(path, yaml.safe_dump(plant_to_mapping(plant), sort_keys=False))
+
+
+def nominal_plant_text() -> str:
+    """Return the nominal rig as a plant.yaml with comments, which `load_plant` reads."""
+    lines = [
+        '# The nominal plant, whole. Every key may be left out and has this value then.',
+        'joints:',
+    ]
+    for name in JOINT_NAMES:
+        lines += [f'  {name}:', *_commented(asdict(JointParameters()), 4)]
+    lines += ['sensors:', *_commented(asdict(SensorParameters()), 2)]
+    lines += [
+        '# Physics beyond that: `endoscope effects` lists it, `endoscope effects ID` tells all.',
+        '# effects:',
+        '#   - {id: ID, joint: bend_x, parameters: {NAME: NUMBER}}',
+        'effects: []',
+    ]
+    return '\n'.join(lines) + '\n'
+
+
+def _commented(values: dict[str, Any], indent: int) -> list[str]:
+    lines = []
+    for key, value in values.items():
+        known = NUMBERS[key]
+        shown = list(value) if isinstance(value, tuple) else value
+        text = f'{" " * indent}{key}: {shown}'
+        lines.append(f'{text:40}  # {known.unit + "; " if known.unit else ""}{known.meaning}')
+    return lines

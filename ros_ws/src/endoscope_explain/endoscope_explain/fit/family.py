@@ -11,9 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from endoscope_core.physics.functions.interpolation import NODES
-from endoscope_core.physics.functions.place import Place, Shape
-from endoscope_core.physics.functions.places import RELAXING
+from endoscope_core.physics.functions.places import NODES, RELAXING, Place, Shape
 from endoscope_core.physics.layout import (
     IN_COMMAND,
     IN_OTHER_JOINT,

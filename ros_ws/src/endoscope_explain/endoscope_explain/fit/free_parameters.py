@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.physics.effect import Parameter
 from endoscope_core.physics.effects import describe, lacking
-from endoscope_core.physics.functions.interpolation import HIGH, LAG
-from endoscope_core.physics.functions.place import Place
+from endoscope_core.physics.functions.places import HIGH, LAG, Place
 from endoscope_core.physics.layout import FRICTION_PROFILE, NOMINAL_KEYS
 from endoscope_core.physics.plant_numbers import NUMBERS, PlantNumber
 from endoscope_explain.explanation import NINETY_PERCENT

@@ -13,7 +13,7 @@ from scipy.stats import chi2, t
 
 from endoscope_core.physics.effect import Effect
 from endoscope_core.physics.effects import lacking
-from endoscope_core.physics.functions.interpolation import NODES, VALUES
+from endoscope_core.physics.functions.places import NODES, VALUES
 from endoscope_core.physics.layout import FRICTION_PROFILE, PROFILE_TERMS
 from endoscope_core.physics.plant_numbers import NUMBERS
 from endoscope_explain.criteria import REACH

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_core.physics.effect import NominalPhysics, Symptom
 from endoscope_core.physics.effects import CATALOGUE, describe, showing
-from endoscope_core.physics.functions.interpolation import HIGH, LAG, NODES, VALUES
+from endoscope_core.physics.functions.places import HIGH, LAG, NODES, VALUES
 from endoscope_core.physics.kernel import run_joints
 from endoscope_core.physics.layout import (
     FRICTION_PROFILE,

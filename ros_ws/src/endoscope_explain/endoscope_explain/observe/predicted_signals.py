@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.kernel import run_joints
 from endoscope_core.physics.layout import OUTPUTS
-from endoscope_core.physics.packing import pack, rest_state
-from endoscope_core.physics.recording import recording_faults
+from endoscope_core.physics.packing import pack, recording_faults, rest_state
 from endoscope_core.physics.simulator import TICK
 from endoscope_explain.explanation import ChannelFit
 from endoscope_explain.observe.observation import JointObservation, observe

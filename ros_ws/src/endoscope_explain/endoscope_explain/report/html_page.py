@@ -8,7 +8,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from endoscope_core.pages import zoomable
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
-from endoscope_core.physics.functions.place import Argument
+from endoscope_core.physics.functions.places import Argument
 from endoscope_explain.case import EXPERIMENT_FILE, ExplainedCase, Ladder
 from endoscope_explain.explanation import Explanation, Verdict
 from endoscope_explain.fit.evidence import slips

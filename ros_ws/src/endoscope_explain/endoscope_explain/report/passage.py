@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.pages.zoomable import COLUMNS, Curve, Plot, figure_html
-from endoscope_core.physics.functions.place import Argument
+from endoscope_core.physics.functions.places import Argument
 from endoscope_core.physics.layout import OUT_JOINT, OUT_MOTOR_SPEED
 from endoscope_core.physics.simulator import TICK
 from endoscope_explain.case import Place

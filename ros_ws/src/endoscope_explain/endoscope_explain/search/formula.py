@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from endoscope_core.physics.description import TermSpec
 from endoscope_core.physics.functions.expression import evaluate
-from endoscope_core.physics.functions.place import Shape
+from endoscope_core.physics.functions.places import Shape
 from endoscope_core.physics.functions.term import tabulated
 from endoscope_explain.fit.family import Family
 from endoscope_explain.fit.free_parameters import COORDINATE

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.physics.functions.interpolation import NODES
+from endoscope_core.physics.functions.places import NODES
 from endoscope_explain.fit.evidence import (
     held_out_misfit,
     held_out_residuals,

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from endoscope_core.physics.effect import Effect, NominalPhysics
 from endoscope_core.physics.effects import CATALOGUE, KNOWN
 from endoscope_core.physics.functions import FUNCTIONS
-from endoscope_core.physics.functions.acting import ADDS, FLAGS_OF_FUNCTIONS, MULTIPLIES
-from endoscope_core.physics.functions.interpolation import HIGH, LAG, LOW
-from endoscope_core.physics.functions.place import LAGS_S, Place, Shape
+from endoscope_core.physics.functions.evaluation import ADDS, FLAGS_OF_FUNCTIONS, MULTIPLIES
+from endoscope_core.physics.functions.places import HIGH, LAG, LAGS_S, LOW, Place, Shape
 from endoscope_explain.fit.family import Family, family_at, visited_range, visited_states
 from endoscope_explain.fit.free_parameters import (
     coefficients,

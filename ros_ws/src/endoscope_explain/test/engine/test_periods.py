@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lombscargle
 
 from endoscope_core.physics.functions import FUNCTIONS
-from endoscope_core.physics.functions.interpolation import NODES
+from endoscope_core.physics.functions.places import NODES
 from endoscope_explain.fit.family import family_at
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.search.repetition import likely_periods, period_bounds, periodogram

@@ -8,7 +8,7 @@ import pytest
 from endoscope_core.physics.description import EffectSpec, PlantDescription, TermSpec
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
-from endoscope_core.physics.functions.acting import MULTIPLIES
+from endoscope_core.physics.functions.evaluation import MULTIPLIES
 from endoscope_core.physics.packing import pack
 from endoscope_explain.decide.conclusions import plant_of
 from endoscope_explain.decide.decision import decide

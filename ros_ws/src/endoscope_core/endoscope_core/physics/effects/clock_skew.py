@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from endoscope_core.physics.effect import Effect, Parameter, Stage, Symptom, Traits
 from endoscope_core.physics.hooks import on_samples
-from endoscope_core.physics.samples import RecordingFaults
+from endoscope_core.physics.sensing import RecordingFaults
 
 STARTS = (-5e-4, 5e-4, -5e-3, 5e-3, -0.015, 0.015, -0.03, 0.03)
 """A skew is found from a start by which no angle of a motion of seconds over tens of seconds is off

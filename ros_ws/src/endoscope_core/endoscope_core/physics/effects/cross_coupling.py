@@ -37,6 +37,6 @@ def moment(
 
 @hook(EFFECT, END_LENGTH)
 @compiled
-def wire_way(p: Array, x: Array, other: float) -> float:
-    """What the other joint adds to the way of the positive wire at the joint, m."""
+def wire_length(p: Array, x: Array, other: float) -> float:
+    """What the other joint adds to the displacement of the positive wire at the joint, m."""
     return p[JOINT_RADIUS] * p[WIRE] * other

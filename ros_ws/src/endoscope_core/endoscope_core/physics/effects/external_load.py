@@ -4,7 +4,7 @@ import math
 
 from endoscope_core.compiled import Array, compiled
 from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
-from endoscope_core.physics.effects.onset import STARTS, share_after
+from endoscope_core.physics.effects.laws import ONSETS, share_after
 from endoscope_core.physics.hooks import LOAD, hook
 
 EVER = 1e6
@@ -21,7 +21,7 @@ EFFECT = Effect(
         Parameter(
             'moment_nm', 'N m', -0.1, 0.1, 0.0008, off=0.0, starts=(0.0005,), comparable=True
         ),
-        Parameter('time_s', 's', 0.0, 3600.0, 15.0, starts=STARTS, comparable=True),
+        Parameter('time_s', 's', 0.0, 3600.0, 15.0, starts=ONSETS, comparable=True),
         Parameter('duration_s', 's', 0.0, 5.0, 0.0, starts=(0.05,)),
         Parameter(
             'smooth', '-', 0.0, 1.0, 0.0, counted=True, words=('changes evenly', 'changes smoothly')

@@ -2,7 +2,7 @@
 
 from endoscope_core.compiled import Array, compiled
 from endoscope_core.physics.effect import Effect, Parameter, Stage
-from endoscope_core.physics.effects.play import follow
+from endoscope_core.physics.effects.laws import play
 from endoscope_core.physics.hooks import PULLEY_ANGLE, hook
 from endoscope_core.physics.layout import SLOTS
 
@@ -34,6 +34,6 @@ def behind_play(p: Array, x: Array, shaft: float) -> float:
     total = 0.0
     for k in range(3):
         share = 1.0 + (k - 1) * p[SPREAD]
-        x[FLANKS + k] = follow(x[FLANKS + k], shaft, half_gap * share)
+        x[FLANKS + k] = play(x[FLANKS + k], shaft, half_gap * share)
         total += x[FLANKS + k] - shaft
     return shaft + total / 3.0

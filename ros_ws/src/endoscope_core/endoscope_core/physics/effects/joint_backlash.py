@@ -2,7 +2,7 @@
 
 from endoscope_core.compiled import Array, compiled
 from endoscope_core.physics.effect import Effect, Parameter, Stage
-from endoscope_core.physics.effects.play import follow
+from endoscope_core.physics.effects.laws import play
 from endoscope_core.physics.hooks import TIP_ANGLE, hook
 from endoscope_core.physics.layout import TIP
 
@@ -24,4 +24,4 @@ EFFECT = Effect(
 @compiled
 def behind_play(p: Array, x: Array, joint: float) -> float:
     """Tip's angle in rad once the joint has moved to `joint`, where the wires' ends are."""
-    return follow(x[TIP], joint, 0.5 * p[GAP])
+    return play(x[TIP], joint, 0.5 * p[GAP])

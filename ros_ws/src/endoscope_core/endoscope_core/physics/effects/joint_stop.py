@@ -2,7 +2,7 @@
 
 from endoscope_core.compiled import Array, compiled
 from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
-from endoscope_core.physics.effects.hunt_crossley import push_back
+from endoscope_core.physics.effects.laws import push_back
 from endoscope_core.physics.hooks import LOAD, hook
 
 EFFECT = Effect(

@@ -2,7 +2,7 @@
 
 from endoscope_core.compiled import Array, compiled
 from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
-from endoscope_core.physics.effects.past import value_before
+from endoscope_core.physics.effects.laws import value_before
 from endoscope_core.physics.hooks import CELL_INPUT, hook
 from endoscope_core.physics.layout import TENSION_HISTORY, TICKS
 

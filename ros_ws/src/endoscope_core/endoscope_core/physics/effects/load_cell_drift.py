@@ -2,7 +2,7 @@
 
 from endoscope_core.compiled import Array, compiled
 from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits
-from endoscope_core.physics.effects.cells import ONE_CELL
+from endoscope_core.physics.effects.laws import ONE_CELL
 from endoscope_core.physics.hooks import LOAD_CELL, hook
 
 EFFECT = Effect(

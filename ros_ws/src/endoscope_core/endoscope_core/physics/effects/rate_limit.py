@@ -59,11 +59,11 @@ def slewed(p: Array, x: Array, command: float, history: Array, tick: float) -> f
     """Mean of the slewed command over a tick with `command` held; advances the slew."""
     if p[OF_COMMAND] <= 0.5:
         return command
-    way = command - x[SLEWED]
+    missing = command - x[SLEWED]
     most = p[LIMIT] * tick
-    if abs(way) > most:
-        x[SLEWED] += math.copysign(most, way)
-        return x[SLEWED] - math.copysign(0.5 * most, way)
+    if abs(missing) > most:
+        x[SLEWED] += math.copysign(most, missing)
+        return x[SLEWED] - math.copysign(0.5 * most, missing)
     x[SLEWED] = command
-    # On the way for a share of the tick, there for the rest.
-    return command - 0.5 * way * abs(way) / most
+    # Slewing for a share of the tick, arrived for the rest.
+    return command - 0.5 * missing * abs(missing) / most

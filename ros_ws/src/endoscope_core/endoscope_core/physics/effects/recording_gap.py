@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from endoscope_core.physics.effect import Effect, Parameter, Stage, Symptom, Traits
 from endoscope_core.physics.hooks import on_samples
-from endoscope_core.physics.samples import TOPICS, Gap, RecordingFaults
+from endoscope_core.physics.sensing import TOPICS, Gap, RecordingFaults
 
 EFFECT = Effect(
     'recording_gap',

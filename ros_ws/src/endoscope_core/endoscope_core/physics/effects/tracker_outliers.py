@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from endoscope_core.physics.effect import Effect, Parameter, Stage, Symptom, Traits
 from endoscope_core.physics.hooks import on_samples
-from endoscope_core.physics.samples import Outliers, RecordingFaults
+from endoscope_core.physics.sensing import Outliers, RecordingFaults
 
 EFFECT = Effect(
     'tracker_outliers',

@@ -2,7 +2,7 @@
 
 from endoscope_core.compiled import Array, compiled
 from endoscope_core.physics.effect import Effect, Parameter, Stage
-from endoscope_core.physics.effects.past import value_before
+from endoscope_core.physics.effects.laws import value_before
 from endoscope_core.physics.hooks import COMMAND, hook
 from endoscope_core.physics.layout import COMMAND_HISTORY, TICKS
 

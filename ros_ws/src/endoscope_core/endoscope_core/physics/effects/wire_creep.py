@@ -41,8 +41,8 @@ def crept(p: Array, x: Array, wire: int, time: float) -> float:
 @compiled
 def creep(p: Array, x: Array, load_a: float, load_b: float, time: float, tick: float) -> None:
     """Let both wires creep for a tick, exactly where both their ends are held."""
-    quick = _way(p, tick / p[TIME_CONSTANT])
-    slow = _way(p, tick / p[SLOW_TIME_CONSTANT])
+    quick = _crept_share(p, tick / p[TIME_CONSTANT])
+    slow = _crept_share(p, tick / p[SLOW_TIME_CONSTANT])
     for wire in range(2):
         load = (load_a if wire == 0 else load_b) - x[REST_TENSION]
         end = p[RATIO] * load / p[WIRE_STIFFNESS]
@@ -51,6 +51,6 @@ def creep(p: Array, x: Array, load_a: float, load_b: float, time: float, tick: f
 
 
 @compiled
-def _way(p: Array, ticks: float) -> float:
-    """Share of the way to its end that creep goes in a tick, as it unloads the wire meanwhile."""
+def _crept_share(p: Array, ticks: float) -> float:
+    """Share of what is left that a wire creeps in a tick, as creep unloads the wire meanwhile."""
     return -math.expm1(-(1.0 + p[RATIO]) * ticks) / (1.0 + p[RATIO])

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from endoscope_core.physics.description import TermSpec
 from endoscope_core.physics.functions import describe_place
+from endoscope_core.physics.functions.evaluation import function_at
 from endoscope_core.physics.functions.expression import evaluate
-from endoscope_core.physics.functions.interpolation import NODES, VALUES, function_at
-from endoscope_core.physics.functions.place import LAGS_S, Place, Shape
+from endoscope_core.physics.functions.places import LAGS_S, NODES, VALUES, Place, Shape
 
 Array = NDArray[np.float64]
 
