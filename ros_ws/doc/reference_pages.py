@@ -22,11 +22,11 @@ import yaml
 from endoscope_bags.table_mapping import EXAMPLE
 from endoscope_bringup.cli import build_parser
 from endoscope_core.physics import EffectSpec, JointParameters, PlantDescription, SensorParameters
+from endoscope_core.physics.description import NUMBERS
 from endoscope_core.physics.effect import Parameter
 from endoscope_core.physics.effects import KNOWN
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.plant_file import plant_to_mapping
-from endoscope_core.physics.plant_numbers import NUMBERS
 from endoscope_nodes import program
 from endoscope_nodes.runtime.node_parameters import OF_NODE, OF_PROCESS
 from endoscope_nodes.runtime.parameters import Described, as_typed, described
@@ -199,8 +199,8 @@ def _plant_keys() -> Iterator[str]:
     """Bounds and units of every key of a plant.yaml."""
     for title, kind in (('joints', JointParameters), ('sensors', SensorParameters)):
         yield from ('', f'## {title}')
-        yield from _table(('key', 'nominal', 'allowed', 'unit'), _keys(kind))
-        yield f'What each means: [{kind.__name__}](api_core.md#endoscope_corephysics).'
+        yield from _table(('key', 'nominal', 'allowed', 'unit', 'meaning'), _keys(kind))
+        yield f'Forms and limits: [{kind.__name__}](api_core.md#endoscope_corephysics).'
 
 
 def _keys(kind: type) -> Iterator[tuple[str, ...]]:
@@ -211,6 +211,7 @@ def _keys(kind: type) -> Iterator[tuple[str, ...]]:
             f'`{as_typed(key.default)}`',
             _range(known.low, known.high),
             known.unit,
+            known.meaning,
         )
 
 

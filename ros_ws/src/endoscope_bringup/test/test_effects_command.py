@@ -4,10 +4,10 @@ import json
 
 from endoscope_bringup.cli import main
 from endoscope_core.physics import PlantDescription, load_plant
+from endoscope_core.physics.description import NUMBERS
 from endoscope_core.physics.effects import CATALOGUE, NOMINAL_PHYSICS
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.plant_file import plant_from_mapping
-from endoscope_core.physics.plant_numbers import NUMBERS
 
 
 def test_lists_every_effect(capsys):

@@ -14,9 +14,9 @@ from endoscope_core.physics import (
     load_plant,
     save_plant,
 )
+from endoscope_core.physics.description import NUMBERS
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions.places import NODES
-from endoscope_core.physics.plant_numbers import NUMBERS
 
 
 def written(tmp_path, text):

@@ -23,7 +23,7 @@ from endoscope_core.physics import (
     load_plant,
     save_plant,
 )
-from endoscope_core.physics.plant_numbers import NUMBERS
+from endoscope_core.physics.description import NUMBERS
 from endoscope_core.signals.command_file import read_command_file, write_command_file
 from endoscope_devices.load_cells.calibration_file import load_calibration
 

@@ -8,43 +8,71 @@ friction (Aerospace Corp. TOR-0158(3107-18)-1, 1968).
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from enum import StrEnum
+from typing import Any
 
+from endoscope_core.physics.effect import Stage
 from endoscope_core.physics.layout import PROFILE_TERMS
 from endoscope_core.schema import Number
+
+
+class Keeper(StrEnum):
+    """What keeps a number from one recording of a rig to the next."""
+
+    DEVICE = 'device'  # one number, whatever the tube
+    JOINT = 'joint'  # scatters a little from one shape of the tube to the next
+    SHAPE = 'shape'  # of the tube: another one in each
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlantNumber:
+    """What is known of one key of a plant beside its nominal value, in SI units.
+
+    A healthy rig's number is the described one but for a factor (`scaled`), or is off by `spread`
+    (rms), or is as it was drawn and machined.
+    """
+
+    unit: str
+    meaning: str
+    # Of a steerable instrument drawn by wires.
+    low: float
+    high: float
+    endless: bool = False  # a plant file may have `.inf` for `high`
+    stage: Stage
+    scaled: bool = False
+    spread: float = 0.0
+    keeper: Keeper = Keeper.JOINT
+
+
+_ROW = 'number'
+
+
+def _number(
+    nominal: Any, unit: str, meaning: str, low: float, high: float, stage: Stage, **known: Any
+) -> Any:
+    """A field of a plant with its row of the table."""
+    known |= {'unit': unit, 'meaning': meaning, 'low': low, 'high': high, 'stage': stage}
+    return field(default=nominal, metadata={_ROW: PlantNumber(**known)})
+
+
+# What bounds the numbers of the tables below:
+# A wire of 1 mm breaks at about 1 kN, and one of 20 mm length and 1 mm2 stiffens to E A / L =
+# 1e7 N/m (steel, E = 2e11 Pa). A pulley finer than the wire, or one of 0.2 m, is none. An
+# exponent of 10 is friction of 1 over one and a half turns and passes 1/22000 of the tension.
+# Joint and motor are bounded by a finger's moment (10 N m) and by servos between 0.02 Hz and
+# 1.6 kHz; a sensor's resolution by what it measures at most.
 
 
 @dataclass(frozen=True)
 class JointParameters:
     """One bending joint with its antagonistic pair of wires and its servo (SI units).
 
-    Attributes
-    ----------
-    pretension : float
-        Tension T0 of each wire at the motor before the start, N.
-    pretension_profile : float
-        How the wires were tightened: T0 exp(-pretension_profile phi) along the sheath; 1 from the
-        motor's side, 0 evenly.
-    wire_stiffness : float
-        Stiffness k of a whole wire in N/m.
-    pulley_radius, joint_radius : float
-        Radii in m at which the wires are wound at the motor, and act on the joint.
-    capstan_exponent : float
-        Exponent Phi = mu Theta of the whole sheath; what the tube's shape changes.
-    friction_profile : tuple of float
-        Coefficients c_j by which the share of the exponent along the wire is proportional to
-        exp(sum c_j cos(j pi s)), s from 0 at the motor to 1 at the joint.
-    joint_stiffness, joint_damping : float
-        Elastic moment K in N m/rad and viscous moment c in N m s/rad of the bending section.
-    joint_rest_angle : float
-        Angle q0 in rad at which the bending section is at rest without wires; they are tightened at
-        angle zero, where friction holds it.
-    joint_friction, joint_presliding : float
-        Dahl friction tau_f in N m of the joint and its pre-sliding angle qs in rad.
-    joint_presliding_spread : float
-        s of three equal elements with pre-sliding angles qs exp(-s), qs and qs exp(s).
-    motor_bandwidth, motor_damping_ratio : float
-        Natural frequency wm in rad/s and damping ratio of the servo's position loop.
+    Each wire is tightened to T = pretension exp(-pretension_profile phi), phi the capstan exponent
+    from the motor to a place, whose share along the wire is proportional to
+    exp(sum of friction_profile[j] cos((j + 1) pi s)), s from 0 at the motor to 1 at the joint. With
+    joint_presliding_spread s the joint has three equal elements with pre-sliding angles qs exp(-s),
+    qs and qs exp(s). The wires are tightened at angle zero, where friction holds the joint.
 
     Raises
     ------
@@ -52,32 +80,71 @@ class JointParameters:
         If a value is not finite, out of its bounds in physics, or the profile has too many terms.
     """
 
-    pretension: float = 5.0
-    pretension_profile: float = 0.75
-    wire_stiffness: float = 3000.0
-    pulley_radius: float = 0.0024
-    joint_radius: float = 0.0008
-    capstan_exponent: float = 0.9
-    joint_stiffness: float = 0.0045
-    joint_rest_angle: float = 0.0
-    joint_friction: float = 9.0e-4
-    joint_presliding: float = 0.03
-    joint_presliding_spread: float = 0.0
-    joint_damping: float = 1.0e-5
-    motor_bandwidth: float = 30.0
-    motor_damping_ratio: float = 0.9
-    friction_profile: tuple[float, ...] = ()
+    # fmt: off
+    pretension: float = _number(
+        5.0, 'N', 'tension of each wire at the motor before the start',
+        0.0, 1e3, Stage.TRANSMISSION, scaled=True,
+    )
+    pretension_profile: float = _number(
+        0.75, '', 'how the wires were tightened: 1 from the motor, 0 evenly, -1 to 1',
+        -1.0, 1.0, Stage.TRANSMISSION, spread=0.25, keeper=Keeper.SHAPE,
+    )
+    wire_stiffness: float = _number(
+        3000.0, 'N/m', 'stiffness of a whole wire',
+        1.0, 1e7, Stage.TRANSMISSION, endless=True, scaled=True,
+    )
+    pulley_radius: float = _number(
+        0.0024, 'm', 'radius at which the wires are wound at the motor',
+        1e-4, 0.1, Stage.TRANSMISSION, keeper=Keeper.DEVICE,
+    )
+    joint_radius: float = _number(
+        0.0008, 'm', 'radius at which the wires act on the joint',
+        1e-4, 0.1, Stage.TRANSMISSION, keeper=Keeper.DEVICE,
+    )
+    capstan_exponent: float = _number(
+        0.9, '', 'friction times the bend of the whole sheath; what its shape changes',
+        0.0, 10.0, Stage.TRANSMISSION, scaled=True, keeper=Keeper.SHAPE,
+    )
+    joint_stiffness: float = _number(
+        0.0045, 'N m/rad', 'elastic moment of the bending section',
+        0.0, 10.0, Stage.JOINT, scaled=True,
+    )
+    joint_rest_angle: float = _number(
+        0.0, 'rad', 'angle at which the bending section rests without wires',
+        -math.pi, math.pi, Stage.JOINT, spread=0.05, keeper=Keeper.SHAPE,
+    )
+    joint_friction: float = _number(
+        9.0e-4, 'N m', 'Dahl friction of the joint',
+        0.0, 10.0, Stage.JOINT, scaled=True,
+    )
+    joint_presliding: float = _number(
+        0.03, 'rad', 'angle over which that friction builds up',
+        1e-5, math.pi, Stage.JOINT, scaled=True,
+    )
+    joint_presliding_spread: float = _number(
+        0.0, '', 'spread of three such angles, 0 for one',
+        0.0, 5.0, Stage.JOINT, spread=0.5,
+    )
+    joint_damping: float = _number(
+        1.0e-5, 'N m s/rad', 'viscous moment of the bending section',
+        1e-7, 10.0, Stage.JOINT, scaled=True,
+    )
+    motor_bandwidth: float = _number(
+        30.0, 'rad/s', "natural frequency of the servo's position loop",
+        0.1, 1e4, Stage.ACTUATOR, endless=True, scaled=True, keeper=Keeper.DEVICE,
+    )
+    motor_damping_ratio: float = _number(
+        0.9, '', 'its damping ratio',
+        0.01, 100.0, Stage.ACTUATOR, scaled=True, keeper=Keeper.DEVICE,
+    )
+    friction_profile: tuple[float, ...] = _number(
+        (), '', 'how friction is spread along the wire: cosine coefficients, [] evenly',
+        -5.0, 5.0, Stage.TRANSMISSION, spread=0.5, keeper=Keeper.SHAPE,
+    )
+    # fmt: on
 
     def __post_init__(self) -> None:
-        may_be_zero = {
-            'pretension',
-            'capstan_exponent',
-            'joint_friction',
-            'joint_stiffness',
-            'joint_presliding_spread',
-        }
-        signed = {'joint_rest_angle', 'pretension_profile'}
-        _check_numbers(self, may_be_zero, signed)
+        _check_numbers(self)
         if abs(self.pretension_profile) > 1.0:
             raise ValueError(
                 f'pretension_profile is {self.pretension_profile}: friction holds -1 to 1'
@@ -102,20 +169,55 @@ class SensorParameters:
         If a value is not finite, negative, or a rate or count is zero.
     """
 
-    load_cell_noise: float = 0.02
-    load_cell_resolution: float = 0.002
-    load_cell_rate: float = 1000.0
-    tracker_noise: float = 0.00436
-    tracker_rate: float = 40.0
-    encoder_counts: float = 4096.0
-    velocity_resolution: float = 0.02397
-    effort_noise: float = 0.0015
-    effort_resolution: float = 0.0046
+    # fmt: off
+    load_cell_noise: float = _number(
+        0.02, 'N', 'noise (rms) of the load cells',
+        0.0, 1e3, Stage.SENSING,
+    )
+    load_cell_resolution: float = _number(
+        0.002, 'N', 'their step',
+        0.0, 1e3, Stage.SENSING,
+    )
+    load_cell_rate: float = _number(
+        1000.0, 'Hz', 'their rate, and that of the motors where a bag has none',
+        0.1, 1e5, Stage.SENSING,
+    )
+    tracker_noise: float = _number(
+        0.00436, 'rad', 'noise (rms) of the bending angle from the tracker',
+        0.0, math.pi, Stage.SENSING,
+    )
+    tracker_rate: float = _number(
+        40.0, 'Hz', 'its rate',
+        0.1, 1e5, Stage.SENSING,
+    )
+    encoder_counts: float = _number(
+        4096.0, 'counts a turn', "of the motor's encoder",
+        1.0, 2.0**32, Stage.SENSING,
+    )
+    velocity_resolution: float = _number(
+        0.02397, 'rad/s', "step of the motor's velocity",
+        0.0, 1e3, Stage.SENSING,
+    )
+    effort_noise: float = _number(
+        0.0015, 'N m', "noise (rms) of the motor's torque",
+        0.0, 1e3, Stage.SENSING,
+    )
+    effort_resolution: float = _number(
+        0.0046, 'N m', 'its step',
+        0.0, 1e3, Stage.SENSING,
+    )
+    # fmt: on
 
     def __post_init__(self) -> None:
-        positive = {'load_cell_rate', 'tracker_rate', 'encoder_counts'}
-        may_be_zero = {f.name for f in dataclasses.fields(self)} - positive
-        _check_numbers(self, may_be_zero, set())
+        _check_numbers(self)
+
+
+NUMBERS: Mapping[str, PlantNumber] = {
+    each.name: each.metadata[_ROW]
+    for kind in (JointParameters, SensorParameters)
+    for each in fields(kind)
+}
+"""Rows of all keys of joints and sensors."""
 
 
 @dataclass(frozen=True)
@@ -202,16 +304,12 @@ class PlantDescription:
         return tuple(self.joints)
 
 
-def _check_numbers(
-    parameters: JointParameters | SensorParameters, may_be_zero: set[str], signed: set[str]
-) -> None:
-    for item in dataclasses.fields(parameters):
-        value = getattr(parameters, item.name)
+def _check_numbers(parameters: JointParameters | SensorParameters) -> None:
+    for key, value in vars(parameters).items():
         if isinstance(value, tuple):
             continue
         if not math.isfinite(value):
-            raise ValueError(f'{item.name} is {value}: give a finite number')
-        if item.name in signed:
-            continue
-        if value < 0 or (value == 0 and item.name not in may_be_zero):
-            raise ValueError(f'{item.name} is {value}: it must be positive')
+            raise ValueError(f'{key} is {value}: give a finite number')
+        low = NUMBERS[key].low
+        if low >= 0.0 and (value < 0.0 or (value == 0.0 and low > 0.0)):
+            raise ValueError(f'{key} is {value}: it must be positive')

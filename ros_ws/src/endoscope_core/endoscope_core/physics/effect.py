@@ -103,38 +103,17 @@ class Traits:
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect of the catalogue, which it enters as it is made; a subclass has its own mapping.
+    """An effect of the catalogue, which it enters when created; a subclass has its own mapping."""
 
-    Attributes
-    ----------
-    id : str
-        Name in the catalogue.
-    stage : Stage
-        Where in the chain it acts.
-    order : int
-        Its place among those of its stage: the smaller, the earlier in the chain.
-    physics, equation, source : str
-        In words, as an equation, and the literature it comes from.
-    parameters : tuple of Parameter
-        In the order of their slots.
-    traits : Traits
-    flag, first_parameter : int
-        Indices in the compiled physics' flag and parameter arrays.
-
-    Raises
-    ------
-    ValueError
-        If the id is taken.
-    """
-
-    id: str
+    id: str  # in the catalogue; a ValueError if it is taken
     stage: Stage
-    order: int
-    physics: str
+    order: int  # among those of its stage: the smaller, the earlier in the chain
+    physics: str  # in words
     equation: str
-    source: str
-    parameters: tuple[Parameter, ...]
+    source: str  # the literature it comes from
+    parameters: tuple[Parameter, ...]  # in the order of their slots
     traits: Traits = Traits()
+    # Indices in the compiled physics' flag and parameter arrays.
     flag: int = field(default_factory=SLOTS.flag)
     first_parameter: int = field(init=False)
 

@@ -21,7 +21,7 @@ from msgspec import Meta
 
 from endoscope_core.atomic_output import write_text
 from endoscope_core.errors import EndoscopeError, nearest
-from endoscope_core.physics.description import JointParameters
+from endoscope_core.physics.description import NUMBERS, JointParameters
 from endoscope_core.physics.layout import NOMINAL_KEYS
 from endoscope_core.schema import Number, load
 
@@ -32,14 +32,14 @@ SPAN = math.radians(120.0)
 """Bend over which a line grows by its second number."""
 MOST_BENT = math.radians(300.0)
 """The tubes recorded were bent by 0 to 240 deg; a line says little far beyond them."""
-SIGNED = ('pretension_profile', 'joint_rest_angle')
+SIGNED = tuple(key for key in NOMINAL_KEYS if NUMBERS[key].low < 0.0)
 """Keys that follow their line themselves; the logarithm of every other key does."""
 _MOST_TERMS = 3
 _DIGITS = 6
 
 
 class FamilyError(EndoscopeError, ValueError):
-    """A tube that is none of a family."""
+    """A tube outside the family."""
 
 
 @dataclass(frozen=True)

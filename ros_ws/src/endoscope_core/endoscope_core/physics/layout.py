@@ -10,40 +10,31 @@ from endoscope_core.physics.sheath import TABLE_ROWS, wire_states
 PROFILE_TERMS = 8
 """Most coefficients that a friction profile can have."""
 
-NOMINAL_KEYS = (
-    'pretension',
-    'pretension_profile',
-    'wire_stiffness',
-    'pulley_radius',
-    'joint_radius',
-    'capstan_exponent',
-    'joint_stiffness',
-    'joint_rest_angle',
-    'joint_friction',
-    'joint_presliding',
-    'joint_presliding_spread',
-    'joint_damping',
-    'motor_bandwidth',
-    'motor_damping_ratio',
-)
-"""Nominal parameters of one number, in order; `friction_profile` follows them."""
+_NOMINAL: list[str] = []
 
-(
-    PRETENSION,
-    PRETENSION_PROFILE,
-    WIRE_STIFFNESS,
-    PULLEY_RADIUS,
-    JOINT_RADIUS,
-    CAPSTAN_EXPONENT,
-    JOINT_STIFFNESS,
-    JOINT_REST_ANGLE,
-    JOINT_FRICTION,
-    JOINT_PRESLIDING,
-    JOINT_PRESLIDING_SPREAD,
-    JOINT_DAMPING,
-    MOTOR_BANDWIDTH,
-    MOTOR_DAMPING_RATIO,
-) = range(len(NOMINAL_KEYS))
+
+def _nominal(key: str) -> int:
+    """Index of a nominal parameter of one number."""
+    _NOMINAL.append(key)
+    return len(_NOMINAL) - 1
+
+
+PRETENSION = _nominal('pretension')
+PRETENSION_PROFILE = _nominal('pretension_profile')
+WIRE_STIFFNESS = _nominal('wire_stiffness')
+PULLEY_RADIUS = _nominal('pulley_radius')
+JOINT_RADIUS = _nominal('joint_radius')
+CAPSTAN_EXPONENT = _nominal('capstan_exponent')
+JOINT_STIFFNESS = _nominal('joint_stiffness')
+JOINT_REST_ANGLE = _nominal('joint_rest_angle')
+JOINT_FRICTION = _nominal('joint_friction')
+JOINT_PRESLIDING = _nominal('joint_presliding')
+JOINT_PRESLIDING_SPREAD = _nominal('joint_presliding_spread')
+JOINT_DAMPING = _nominal('joint_damping')
+MOTOR_BANDWIDTH = _nominal('motor_bandwidth')
+MOTOR_DAMPING_RATIO = _nominal('motor_damping_ratio')
+NOMINAL_KEYS = tuple(_NOMINAL)
+"""In the order of their indices; `friction_profile` follows them."""
 FRICTION_PROFILE = len(NOMINAL_KEYS)
 
 CELLS = 32

@@ -11,6 +11,7 @@ import yaml
 from endoscope_core.atomic_output import write_text
 from endoscope_core.errors import FileError, nearest
 from endoscope_core.physics.description import (
+    NUMBERS,
     EffectSpec,
     JointParameters,
     PlantDescription,
@@ -19,7 +20,6 @@ from endoscope_core.physics.description import (
 )
 from endoscope_core.physics.functions import FUNCTIONS, describe_place
 from endoscope_core.physics.packing import recording_faults, with_nominal_in_place
-from endoscope_core.physics.plant_numbers import NUMBERS
 from endoscope_core.schema import Before, Number, blamed_on, load_yaml, read, within
 
 UNKNOWN_TERM = 'unknown_term'

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.physics.description import NUMBERS, PlantNumber
 from endoscope_core.physics.effect import Parameter
 from endoscope_core.physics.effects import describe, lacking
 from endoscope_core.physics.functions.places import HIGH, LAG, Place
 from endoscope_core.physics.layout import FRICTION_PROFILE, NOMINAL_KEYS
-from endoscope_core.physics.plant_numbers import NUMBERS, PlantNumber
 from endoscope_explain.explanation import NINETY_PERCENT
 
 LEAD = -1

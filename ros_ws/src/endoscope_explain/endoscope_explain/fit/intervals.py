@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2, t
 
+from endoscope_core.physics.description import NUMBERS
 from endoscope_core.physics.effect import Effect
 from endoscope_core.physics.effects import lacking
 from endoscope_core.physics.functions.places import NODES, VALUES
 from endoscope_core.physics.layout import FRICTION_PROFILE, PROFILE_TERMS
-from endoscope_core.physics.plant_numbers import NUMBERS
 from endoscope_explain.criteria import REACH
 from endoscope_explain.explanation import NINETY_PERCENT, Estimate, NominalEstimate
 from endoscope_explain.fit.evidence import counts, is_noise, mean_squares, weights

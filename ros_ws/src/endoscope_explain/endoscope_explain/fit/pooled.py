@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.physics.description import NUMBERS, Keeper
 from endoscope_core.physics.effect import Stage
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.layout import (
@@ -21,7 +22,6 @@ from endoscope_core.physics.layout import (
     NOMINAL_KEYS,
     PROFILE_TERMS,
 )
-from endoscope_core.physics.plant_numbers import NUMBERS, Keeper
 from endoscope_explain.fit.evidence import weights
 from endoscope_explain.fit.free_parameters import LEAD, FreeParameter
 from endoscope_explain.fit.model import Fit, JointModel, central_jacobian

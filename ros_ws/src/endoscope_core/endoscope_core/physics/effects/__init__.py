@@ -31,13 +31,7 @@ KNOWN: dict[str, Effect] = {**CATALOGUE, **NOMINAL_PHYSICS}
 
 
 def describe(effect_id: str) -> Effect:
-    """The catalogue's effect, or the nominal physics, of that id.
-
-    Raises
-    ------
-    UnknownEffectError
-        If there is no such id; the message names the nearest.
-    """
+    """The effect, or the nominal physics, of that id; an UnknownEffectError names the nearest."""
     if effect_id not in KNOWN:
         raise UnknownEffectError(f'unknown effect {effect_id}: {nearest(effect_id, KNOWN)}')
     return KNOWN[effect_id]

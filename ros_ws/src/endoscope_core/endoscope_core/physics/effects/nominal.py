@@ -1,11 +1,20 @@
 """Physics of the nominal plant, as what a plant may lack and a search may find."""
 
+from typing import Any
+
+from endoscope_core.physics.description import NUMBERS, JointParameters
 from endoscope_core.physics.effect import NominalPhysics, Parameter, Stage
 
 RIGID = 1e7
 """N/m: a wire that does not stretch."""
 AT_ONCE = 1e4
 """Rad/s: a servo that is where it is sent within a tick."""
+
+
+def _searched(key: str, low: float, high: float, **more: Any) -> Parameter:
+    """A nominal parameter with the bounds of a search; `more` as in `Parameter`."""
+    return Parameter(key, NUMBERS[key].unit, low, high, getattr(JointParameters, key), **more)
+
 
 NominalPhysics(
     'servo_lag',
@@ -15,13 +24,12 @@ NominalPhysics(
     equation="m'' = motor_bandwidth^2 (u - m) - 2 motor_damping_ratio motor_bandwidth m'",
     source='Ogata, Modern Control Engineering, 5th ed. 2010, sec. 5-3',
     parameters=(
-        Parameter(
-            'motor_bandwidth', 'rad/s', 1.0, AT_ONCE, 30.0, AT_ONCE,
-            starts=(10.0, 30.0, 90.0), scale=1.0,
+        _searched(
+            'motor_bandwidth', 1.0, AT_ONCE, off=AT_ONCE, starts=(10.0, 30.0, 90.0), scale=1.0
         ),
-        Parameter('motor_damping_ratio', '', 0.1, 5.0, 0.9),
+        _searched('motor_damping_ratio', 0.1, 5.0),
     ),
-)  # fmt: skip
+)
 NominalPhysics(
     'wire_pretension',
     Stage.TRANSMISSION,
@@ -29,9 +37,7 @@ NominalPhysics(
     physics='The wires are tightened before the start.',
     equation='T = pretension at the motor, before the start',
     source='Kaneko et al., IEEE ICRA 1991',
-    parameters=(
-        Parameter('pretension', 'N', 0.0, 50.0, 5.0, off=0.0, starts=(2.0, 5.0, 12.0), scale=2.0),
-    ),
+    parameters=(_searched('pretension', 0.0, 50.0, off=0.0, starts=(2.0, 5.0, 12.0), scale=2.0),),
 )
 NominalPhysics(
     'wire_stretch',
@@ -41,12 +47,11 @@ NominalPhysics(
     equation='T = wire_stiffness (travel at the motor - travel at the joint)',
     source='Palli, Melchiorri, IEEE ICRA 2006',
     parameters=(
-        Parameter(
-            'wire_stiffness', 'N/m', 50.0, RIGID, 3000.0, RIGID,
-            starts=(1000.0, 3000.0, 10000.0), scale=1.0,
+        _searched(
+            'wire_stiffness', 50.0, RIGID, off=RIGID, starts=(1000.0, 3000.0, 10000.0), scale=1.0
         ),
     ),
-)  # fmt: skip
+)
 NominalPhysics(
     'sheath_friction',
     Stage.TRANSMISSION,
@@ -55,9 +60,7 @@ NominalPhysics(
     equation='T(s) = T(0) exp(-capstan_exponent s), s from 0 to 1 along the sheath',
     source='Kaneko et al., IEEE ICRA 1991',
     parameters=(
-        Parameter(
-            'capstan_exponent', '', 0.0, 6.0, 0.9, off=0.0, starts=(0.3, 0.9, 2.0), scale=0.3
-        ),
+        _searched('capstan_exponent', 0.0, 6.0, off=0.0, starts=(0.3, 0.9, 2.0), scale=0.3),
     ),
 )
 NominalPhysics(
@@ -68,12 +71,11 @@ NominalPhysics(
     equation='moment = -joint_stiffness (q - joint_rest_angle)',
     source='Webster, Jones, International Journal of Robotics Research 29(13), 2010',
     parameters=(
-        Parameter(
-            'joint_stiffness', 'N m/rad', 0.0, 1.0, 0.0045, off=0.0,
-            starts=(0.002, 0.0045, 0.012), scale=0.0045,
+        _searched(
+            'joint_stiffness', 0.0, 1.0, off=0.0, starts=(0.002, 0.0045, 0.012), scale=0.0045
         ),
     ),
-)  # fmt: skip
+)
 NominalPhysics(
     'bending_friction',
     Stage.JOINT,
@@ -82,10 +84,7 @@ NominalPhysics(
     equation='moment = -joint_friction z, dz/dq = (sign(dq) - z) / joint_presliding',
     source='Dahl, Aerospace Corp. TOR-0158(3107-18)-1, 1968',
     parameters=(
-        Parameter(
-            'joint_friction', 'N m', 0.0, 0.1, 9e-4, off=0.0,
-            starts=(3e-4, 9e-4, 2.7e-3), scale=9e-4,
-        ),
-        Parameter('joint_presliding', 'rad', 1e-3, 1.0, 0.03),
+        _searched('joint_friction', 0.0, 0.1, off=0.0, starts=(3e-4, 9e-4, 2.7e-3), scale=9e-4),
+        _searched('joint_presliding', 1e-3, 1.0),
     ),
-)  # fmt: skip
+)

@@ -45,7 +45,7 @@ def evaluate(expression: str, symbol: str, values: Array) -> Array:
     try:
         tree = ast.parse(expression.strip(), mode='eval').body
     except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
-        raise ValueError(f'{expression!r} is no formula: write it as 0.5*{symbol}**2') from error
+        raise ValueError(f'{expression!r} is not a formula: write it as 0.5*{symbol}**2') from error
     with np.errstate(all='ignore'):
         found = np.broadcast_to(_value(tree, symbol, values, 0), values.shape)
     if not np.all(np.isfinite(found)):
@@ -83,7 +83,7 @@ def _value(node: ast.expr, symbol: str, values: Array, depth: int) -> Any:
         case ast.Call(func=ast.Name(id=name), args=parts, keywords=[]):
             return _call(name, [inner(part) for part in parts])
     raise ValueError(
-        f'{ast.unparse(node)!r} is none of numbers, {symbol}, + - * / **, {", ".join(_NAMES)}'
+        f'{ast.unparse(node)!r} is not one of numbers, {symbol}, + - * / **, {", ".join(_NAMES)}'
     )
 
 
