@@ -9,10 +9,10 @@ import time
 from contextlib import ExitStack
 
 from console_page import Page
-from private_domain import private_domain
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState, Joy
 
+from endoscope_benchmarks.private_domain import private_domain
 from endoscope_nodes.client.graph_client import joined_graph
 from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
 from endoscope_nodes.names import JOINTS, MASTER_CLUTCH, MOTOR_COMMAND, MOTORS, SLAVE_COMMAND

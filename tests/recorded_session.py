@@ -6,7 +6,6 @@ from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
-from private_domain import private_domain
 from probed_runtime import ProbedRuntime
 from rclpy.context import Context
 from sensor_msgs.msg import JointState, Joy
@@ -14,6 +13,7 @@ from std_msgs.msg import Header, String
 
 from endoscope_bags.cdr_encoding import encode_joint_state, encode_poses
 from endoscope_bags.message_types import TF_MESSAGE
+from endoscope_benchmarks.private_domain import private_domain
 from endoscope_core.rig import shipped_rig
 from endoscope_nodes.nodes.instrument_model import JointTransforms, section_of
 from endoscope_nodes.nodes.recorder import RecorderNode

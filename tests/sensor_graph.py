@@ -7,12 +7,12 @@ connection or both, and a test breaks what it likes on the way.
 import time
 from pathlib import Path
 
-from private_domain import private_domain
 from probed_graph import ProbedGraph
 from rclpy.context import Context
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from endoscope_benchmarks.private_domain import private_domain
 from endoscope_nodes.names import (
     JOINTS,
     MOTOR_MEASURED,

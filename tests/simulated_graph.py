@@ -1,7 +1,6 @@
 """All nodes in the process of a test, in simulated time that the test lets go on."""
 
 from diagnostic_msgs.msg import DiagnosticArray
-from private_domain import private_domain
 from probed_graph import ProbedGraph
 from rclpy.context import Context
 from rclpy.qos import QoSProfile
@@ -9,6 +8,7 @@ from rclpy.task import Future
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from endoscope_benchmarks.private_domain import private_domain
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
 from endoscope_nodes.names import CALIBRATION_RESULT, CALIBRATION_RUN, JOINTS
 from endoscope_nodes.nodes.conductor import ConductorNode

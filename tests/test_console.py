@@ -12,12 +12,12 @@ import pytest
 from console_page import Page
 from console_rig import ConsoleRig, Server, engage, ready
 from diagnostic_msgs.msg import DiagnosticArray
-from private_domain import private_domain
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Joy
 from short_bags import PLANT, write_short_bag
 
 from endoscope_bags import open_bag
+from endoscope_benchmarks.private_domain import private_domain
 from endoscope_console.explanations import EXPERIMENT_FILE, REPORT_FILE
 from endoscope_core.physics import save_plant
 from endoscope_core.signals.command_file import write_command_file

@@ -10,10 +10,10 @@ import urllib.request
 
 import pytest
 from console_rig import Server
-from private_domain import private_domain
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
+from endoscope_benchmarks.private_domain import private_domain
 from endoscope_bringup.cli import main
 
 _ADDRESS = '127.0.0.2'

@@ -4,7 +4,6 @@ import dataclasses
 import math
 
 import numpy as np
-from private_domain import private_domain
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.node import Node
@@ -13,6 +12,7 @@ from rclpy.task import Future
 from sensor_msgs.msg import JointState, Joy
 from std_msgs.msg import Header, String
 
+from endoscope_benchmarks.private_domain import private_domain
 from endoscope_core.rig import Timeouts, load_rig
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
 from endoscope_nodes.runtime.runtime import Runtime

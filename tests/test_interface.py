@@ -3,9 +3,9 @@
 from contextlib import ExitStack
 
 import pytest
-from private_domain import private_domain
 from rclpy.context import Context
 
+from endoscope_benchmarks.private_domain import private_domain
 from endoscope_nodes.graph import CONTROL_NODES, SHOWING_NODES, SLAVE_NODES
 from endoscope_nodes.runtime.node_parameters import OF_NODE, OF_PROCESS
 from endoscope_nodes.runtime.parameters import described

@@ -8,11 +8,11 @@ import time
 
 import pytest
 from commanded_graph import Handle
-from private_domain import private_domain
 from rclpy.context import Context
 from rclpy.node import Node
 from simulated_graph import SimulatedGraph
 
+from endoscope_benchmarks.private_domain import private_domain
 from endoscope_bringup.operating.status import status_of
 from endoscope_nodes.client.graph_client import joined_graph
 from endoscope_nodes.client.graph_listener import LOCK_STEP

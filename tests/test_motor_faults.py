@@ -3,11 +3,11 @@
 import re
 
 import pytest
-from private_domain import private_domain
 from std_srvs.srv import Trigger
 
 from endoscope_benchmarks.device_faults.motor_faults import MOTOR_FAULTS, undergo
 from endoscope_benchmarks.device_faults.motor_rig import MotorRig
+from endoscope_benchmarks.private_domain import private_domain
 
 # The bench tries the others too.
 FAULTS = (

@@ -9,12 +9,12 @@ import time
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from private_domain import private_domain
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from endoscope_benchmarks.private_domain import private_domain
 from endoscope_nodes.runtime.qos import EVENT, SENSOR_ASKED
 
 DOMAIN = private_domain()

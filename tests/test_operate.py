@@ -7,9 +7,9 @@ import signal
 
 import pytest
 from operated_graph import OperatedGraph
-from private_domain import private_domain
 from std_msgs.msg import String
 
+from endoscope_benchmarks.private_domain import private_domain
 from endoscope_bringup.cli import main
 from endoscope_nodes.runtime.qos import EVENT
 

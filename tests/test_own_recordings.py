@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from private_domain import private_domain
 
 from endoscope_bags import open_bag
 from endoscope_bags.copying import cut
 from endoscope_benchmarks.own_recordings.live_graph import LiveGraph
+from endoscope_benchmarks.private_domain import private_domain
 from endoscope_core.physics import PlantDescription
 from endoscope_core.rig import shipped_rig
 from endoscope_explain.audit import audit_recording

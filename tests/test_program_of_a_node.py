@@ -9,8 +9,8 @@ import time
 from pathlib import Path
 
 import pytest
-from private_domain import private_domain
 
+from endoscope_benchmarks.private_domain import private_domain
 from endoscope_core.atomic_output import atomic_directory
 from endoscope_nodes import program
 from endoscope_nodes.program import NODES

@@ -11,7 +11,6 @@ import time
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from private_domain import private_domain
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rosbags.highlevel import AnyReader
@@ -22,6 +21,7 @@ from endoscope_bags.cdr_encoding import encode_joint_state
 from endoscope_bags.copying import recover
 from endoscope_bags.errors import TruncatedBagError
 from endoscope_bags.information import bag_information
+from endoscope_benchmarks.private_domain import private_domain
 from endoscope_nodes.runtime.qos import EVENT, SENSOR_OFFERED
 
 TOPIC = '/endoscope/motor/measured_js'

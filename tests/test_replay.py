@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from private_domain import private_domain
 from rclpy.context import Context
 from recorded_session import SERVO, STATE, RecordedSession
 from rosgraph_msgs.msg import Clock
@@ -12,6 +11,7 @@ from endoscope_bags import BagWriter, open_bag
 from endoscope_bags.cdr_encoding import encode_joint_state, encode_string
 from endoscope_bags.message_types import JOINT_STATE, STRING
 from endoscope_bags.topic import COMMAND_QOS, LATCHED_QOS
+from endoscope_benchmarks.private_domain import private_domain
 from endoscope_nodes.nodes.replay import ReplayNode
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import EVENT, SENSOR_OFFERED

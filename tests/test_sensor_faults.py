@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from aurora_rig import Instrument
 from load_cell_rig import BROKEN, SATURATED, Cells, transmitter, write_calibration
-from private_domain import private_domain
 from rclpy.context import Context
 from sensor_graph import PATIENCE_S, SensorGraph
 
 from endoscope_bags import open_bag
 from endoscope_bags.errors import BagError
+from endoscope_benchmarks.private_domain import private_domain
 from endoscope_emulators.aurora import AuroraEmulator
 from endoscope_emulators.cables.serial_cable import SerialCable
 from endoscope_nodes.nodes.em_tracker import EmTrackerNode

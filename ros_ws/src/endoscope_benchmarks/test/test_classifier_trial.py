@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from endoscope_benchmarks.trials.never_seen_tube import never_seen_tube
-from endoscope_benchmarks.trials.unusual_recordings import UNUSUAL
+from endoscope_benchmarks.trials.tracking_trial import never_seen_tube
+from endoscope_benchmarks.trials.unseen_tubes import UNUSUAL
 from endoscope_core.classifier.classification import UnseenTensionError
 from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_core.dataset import record_calibration

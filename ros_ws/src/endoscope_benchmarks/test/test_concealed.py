@@ -5,12 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from endoscope_benchmarks.benches.cases import seeds
+from endoscope_benchmarks.bench import seeds
 from endoscope_benchmarks.concealed import motions
-from endoscope_benchmarks.concealed.case import law_at_place, law_of_effect
-from endoscope_benchmarks.concealed.forms import drawn_form, visited
-from endoscope_benchmarks.concealed.formulas import DRAWN, drawn_formula
-from endoscope_benchmarks.concealed.judge import Statement, judged
+from endoscope_benchmarks.concealed.forms import DRAWN, drawn_form, drawn_formula, visited
+from endoscope_benchmarks.concealed.judge import Statement, judged, law_at_place, law_of_effect
 from endoscope_benchmarks.concealed.readings import misfit, read, record
 from endoscope_benchmarks.concealed.rigs import described_rig, true_rig
 from endoscope_benchmarks.concealed.strata import PLACES, STRATA, drawn_case

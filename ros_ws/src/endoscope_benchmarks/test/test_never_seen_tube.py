@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
-from endoscope_benchmarks.trials.never_seen_tube import (
+from endoscope_benchmarks.trials.tracking_trial import (
     backlash_left,
     calibrate,
     never_seen_tube,
+    run_tracking_trial,
     within_reach,
 )
-from endoscope_benchmarks.trials.tracking_trial import run_tracking_trial
 from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_core.control import FeedforwardLaw
 from endoscope_core.identification.law_choice import LawChoice

@@ -2,7 +2,7 @@ import sys
 
 import pytest
 
-from endoscope_benchmarks.benches.papers_tables.row import PapersBench, Row, table_text
+from endoscope_benchmarks.papers.row import PapersBench, Row, table_text
 from endoscope_bringup.cli import main
 
 
@@ -51,7 +51,7 @@ def test_without_pytorch_one_line_says_how_to_get_it(command, tmp_path, monkeypa
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, 'torch', None)
     for name in (
-        'endoscope_benchmarks.networks.papers_recipe',
+        'endoscope_benchmarks.networks',
         'endoscope_core.classifier.network',
     ):
         monkeypatch.delitem(sys.modules, name, raising=False)

@@ -3,20 +3,21 @@
 import numpy as np
 import pytest
 
-from endoscope_benchmarks.networks.grouped_folds import grouped_folds
 from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
 
 torch = pytest.importorskip('torch', reason='PyTorch is missing: make -C ros_ws train')
 
-from endoscope_benchmarks.networks.papers_recipe import (  # noqa: E402
+from endoscope_benchmarks.networks import (  # noqa: E402
     NETWORKS,
+    PIXELS,
     TrainingSettings,
     cross_validate,
+    grouped_folds,
     predict,
+    recurrence_plots,
     train_network,
     use_one_thread,
 )
-from endoscope_benchmarks.networks.recurrence_plot_cnn import PIXELS, recurrence_plots  # noqa: E402
 from endoscope_core.classifier.network import TensionCnn  # noqa: E402
 
 SHORT = TrainingSettings(batch_size=14, epochs=60, learning_rate=3e-3, decay=0.97)
@@ -86,15 +87,13 @@ def test_training_learns_and_repeats_with_its_seed(easy):
 
 
 def test_folds_never_split_a_configuration(easy, monkeypatch):
-    from endoscope_benchmarks.networks import papers_recipe as training
-
     trained_with = []
 
     def remember(tension, class_deg, seed, settings, kind):
         trained_with.append(tension)
         return TensionCnn(len(CLASSES_DEG)).eval()
 
-    monkeypatch.setattr(training, 'train_network', remember)
+    monkeypatch.setattr('endoscope_benchmarks.networks.train_network', remember)
     result = cross_validate(easy, seed=0, folds=2)
     assert result.confusion.sum() == len(easy.class_deg)
     for tension in trained_with:

@@ -5,12 +5,19 @@ import importlib.util
 import numpy as np
 import pytest
 
-from endoscope_benchmarks.concealed.regions import Overlap, changed_windows, pooled, windows_in
 from endoscope_benchmarks.concealed.strata import drawn_case
 from endoscope_benchmarks.peers.problem import PERIOD_S, predicts, problem_of
 from endoscope_benchmarks.peers.symbolic import OF_PLANT, OF_SENSOR, named_by
 from endoscope_benchmarks.peers.term_library import terms_of
-from endoscope_benchmarks.peers.trial import PEERS, example, require_installed
+from endoscope_benchmarks.peers.trial import (
+    PEERS,
+    Overlap,
+    changed_windows,
+    example,
+    pooled,
+    require_installed,
+    windows_in,
+)
 from endoscope_core.errors import EndoscopeError
 
 

@@ -8,19 +8,25 @@ import numpy as np
 import pytest
 
 from endoscope_benchmarks.concealed import motions
-from endoscope_benchmarks.concealed.case import law_of_effect
-from endoscope_benchmarks.concealed.judge import Statement, judged
+from endoscope_benchmarks.concealed.judge import Statement, judged, law_of_effect
 from endoscope_benchmarks.concealed.readings import as_sensed
 from endoscope_benchmarks.concealed.readings import read as read_of_kernel
 from endoscope_benchmarks.concealed.rigs import described_rig, true_rig
 from endoscope_benchmarks.concealed.strength import moved
 from endoscope_benchmarks.proof import SIMULATORS, SLAVE, sentences
 from endoscope_benchmarks.proof.another_rig import FEW_NODES, FORMS, Laws, drawn_laws, read
-from endoscope_benchmarks.proof.bag_of_rig import write_bag
 from endoscope_benchmarks.proof.drawing import drawn
-from endoscope_benchmarks.proof.seal import BrokenSealError, opened, seal
 from endoscope_benchmarks.proof.slave import tracked
-from endoscope_benchmarks.proof.trial import Answer, Outcome, Passage, Rig
+from endoscope_benchmarks.proof.trial import (
+    Answer,
+    BrokenSealError,
+    Outcome,
+    Passage,
+    Rig,
+    opened,
+    seal,
+    write_bag,
+)
 from endoscope_benchmarks.prove_command import SIMULATORS as OFFERED
 from endoscope_bringup.cli import main
 from endoscope_core.physics import PlantDescription

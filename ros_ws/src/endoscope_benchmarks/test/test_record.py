@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from endoscope_benchmarks.concealed.record import append, differences, rows_of
-from endoscope_benchmarks.concealed.trial import failed
+from endoscope_benchmarks.concealed.trial import append, differences, failed, rows_of
 from endoscope_bringup.cli import main
 from endoscope_core.errors import EndoscopeError
 

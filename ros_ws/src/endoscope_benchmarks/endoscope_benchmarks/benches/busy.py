@@ -6,6 +6,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from endoscope_benchmarks.bench import table_head, table_row
 from endoscope_bringup.subcommands import COUNT, within
 
 
@@ -40,8 +41,9 @@ def run(args: argparse.Namespace) -> int:
         long_motion,
         shell_trial,
     )
+    from endoscope_benchmarks.private_domain import private_domain
 
-    domain = 100 + os.getpid() % 130
+    domain = private_domain()
     rows: dict[str, list[str]] = {'shell': [], 'console': []}
     with busy_loops(args.loops):
         for k in range(args.n):
@@ -67,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
             f'{row.factors[-1]:.2f}, median {row.factors[len(row.factors) // 2]:.2f}'
         )
     if args.n:
-        print('| session | trials | every step |\n|---|---|---|')
+        print(table_head('session', 'trials', 'every step'))
         for name, troubles in rows.items():
-            print(f'| {name} | {len(troubles)} | {troubles.count("")} |')
+            print(table_row(name, len(troubles), troubles.count('')))
     return int(failed)

@@ -31,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
         refused_at_rate,
         tubes_of_all_classes,
     )
-    from endoscope_benchmarks.trials.unusual_recordings import UNUSUAL
+    from endoscope_benchmarks.trials.unseen_tubes import UNUSUAL
     from endoscope_core.classifier.weights_file import load_classifier
     from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
 

@@ -14,6 +14,7 @@ from rclpy.context import Context
 from rclpy.task import Future
 from std_msgs.msg import String
 
+from endoscope_benchmarks.private_domain import process_domain
 from endoscope_core.safety import OperatingState
 from endoscope_nodes.graph import ALL_NODES
 from endoscope_nodes.names import STATE_COMMAND
@@ -130,7 +131,7 @@ class _Composition:
         args: Sequence[str] = (),
     ) -> None:
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.runtime = Runtime(args, Context(), 100 + os.getpid() % 130, overrides)
+        self.runtime = Runtime(args, Context(), process_domain(), overrides)
         for factory in factories:
             self.runtime.add(factory)
         self.runtime.prepare()

@@ -1,9 +1,9 @@
-"""`endoscope bench concealed`: what is said of rigs with something concealed that is drawn anew."""
+"""`endoscope bench concealed`: what is said of rigs with something drawn and concealed."""
 
 import argparse
 from pathlib import Path
 
-from endoscope_benchmarks.benches.cases import add_case_options, of_cases, require_known
+from endoscope_benchmarks.bench import add_case_options, require_known, side_by_side
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -28,9 +28,15 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print a line for each case, then the table; return 1 if a case failed or differs."""
-    from endoscope_benchmarks.concealed.record import append, differences, rows_of
     from endoscope_benchmarks.concealed.strata import STRATA
-    from endoscope_benchmarks.concealed.trial import explained, failed, table
+    from endoscope_benchmarks.concealed.trial import (
+        append,
+        differences,
+        explained,
+        failed,
+        rows_of,
+        table,
+    )
 
     strata = args.stratum or list(STRATA)
     require_known('stratum', strata, STRATA)
@@ -38,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
     cases = list(before) or [(name, seed) for seed in args.seeds for name in strata]
     kept = rows_of(args.json) if args.json and args.json.exists() else {}
     rows = {case: kept[case] for case in cases if case in kept}
-    for case, future in of_cases(args.jobs, [c for c in cases if c not in rows], explained):
+    for case, future in side_by_side(args.jobs, explained, [c for c in cases if c not in rows]):
         error = future.exception()
         rows[case] = failed(*case, error) if error else future.result()
         print(rows[case].line(), flush=True)

@@ -1,8 +1,6 @@
 """`endoscope bench console`: how soon the slave stops, and what the console costs."""
 
 import argparse
-import os
-import platform
 import sys
 import tempfile
 import time
@@ -10,17 +8,28 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from endoscope_bringup.subcommands import COUNT, within
+from endoscope_benchmarks.bench import (
+    add_seconds,
+    require_known,
+    table_head,
+    table_row,
+    today_and_machine,
+)
+from endoscope_bringup.subcommands import COUNT
 
 if TYPE_CHECKING:
     from endoscope_benchmarks.console_trials.events import Outcome
     from endoscope_benchmarks.console_trials.hand import Hand
 
 _USUAL = ('dead-man let go', 'tab closed', 'network silent', 'network cut')
-_HEADING = (
-    '| event | N | to the last change of motor/servo_jp [ms] median, 99 %, largest '
-    '| to clutch 0 [ms] median, 99 %, largest | over 150 ms | crept afterwards [mrad] | load |\n'
-    '|---|---|---|---|---|---|---|'
+_COLUMNS = (
+    'event',
+    'N',
+    'to the last change of motor/servo_jp [ms] median, 99 %, largest',
+    'to clutch 0 [ms] median, 99 %, largest',
+    'over 150 ms',
+    'crept afterwards [mrad]',
+    'load',
 )
 _AIM_MS = 150.0
 # Without a load the last word of a motion comes within 0.05 s of the one that ends it.
@@ -47,12 +56,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         default=30,
         help='inputs whose latency is taken (default: %(default)s)',
     )
-    parser.add_argument(
-        '--seconds',
-        type=within(0.0, 86400.0, float),
-        default=20.0,
-        help='of each figure of cost (default: %(default)g)',
-    )
+    add_seconds(parser, 20.0, 'of each figure of cost')
     parser.add_argument(
         '--real-time',
         action='store_true',
@@ -72,17 +76,11 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_benchmarks.console_trials.hand import Hand
     from endoscope_benchmarks.console_trials.relay import Relay
     from endoscope_benchmarks.console_trials.served_console import ServedConsole
-    from endoscope_core.errors import EndoscopeError
+    from endoscope_benchmarks.private_domain import private_domain
 
     names = tuple(EVENTS) if args.only == ['all'] else tuple(args.only or _USUAL)
-    for name in names:
-        if name not in EVENTS:
-            raise EndoscopeError(f"no event '{name}'; known are {', '.join(EVENTS)}")
-    print(
-        f'{"real" if args.real_time else "simulated"} time, {time.strftime("%Y-%m-%d")}, '
-        f'{os.cpu_count()} cores, {platform.processor() or platform.machine()}',
-        flush=True,
-    )
+    require_known('event', names, EVENTS)
+    print(f'{"real" if args.real_time else "simulated"} time, {today_and_machine()}', flush=True)
     crept = 0
     began_s = time.monotonic()
     with (
@@ -90,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
         Relay() as network,
         ServedConsole(
             Path(folder),
-            100 + os.getpid() % 130,
+            private_domain(),
             (network.address,),
             real_time=args.real_time,
         ) as console,
@@ -99,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
         with Hand(console, network) as hand:
             print(f'{first_motion(hand, began_s)}\n', flush=True)
             if args.repetitions:
-                print(_HEADING, flush=True)
+                print(table_head(*_COLUMNS), flush=True)
             for name in names if args.repetitions else ():
                 crept += _trials(name, hand, args.repetitions)
             if args.inputs:
@@ -136,16 +134,15 @@ def _trials(name: str, hand: 'Hand', repetitions: int) -> int:
 
 def _row(name: str, outcomes: Sequence['Outcome']) -> str:
     loads = [outcome.load for outcome in outcomes]
-    columns = (
+    return table_row(
         name,
-        f'{len(outcomes)}',
+        len(outcomes),
         _spread([max(0.0, outcome.last_change_ms) for outcome in outcomes]),
         _spread([outcome.clutch_ms for outcome in outcomes]),
-        f'{sum(max(o.clutch_ms, o.last_change_ms) > _AIM_MS for o in outcomes)}',
+        sum(max(o.clutch_ms, o.last_change_ms) > _AIM_MS for o in outcomes),
         f'{1e3 * max(outcome.crept for outcome in outcomes):.1f}',
         f'{min(loads):.0f} to {max(loads):.0f}',
     )
-    return f'| {" | ".join(columns)} |'
 
 
 def _spread(values: Sequence[float]) -> str:

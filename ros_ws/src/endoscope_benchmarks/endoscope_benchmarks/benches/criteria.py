@@ -26,7 +26,7 @@ def run(args: argparse.Namespace) -> int:
         sensitivity,
         source,
     )
-    from endoscope_benchmarks.concealed.record import rows_of
+    from endoscope_benchmarks.concealed.trial import rows_of
     from endoscope_core.atomic_output import write_text
     from endoscope_core.errors import EndoscopeError
 

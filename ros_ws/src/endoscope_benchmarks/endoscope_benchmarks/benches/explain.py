@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from endoscope_benchmarks.benches.cases import add_jobs
+from endoscope_benchmarks.bench import add_jobs
 
 TRUTH = '.truth.json'
 

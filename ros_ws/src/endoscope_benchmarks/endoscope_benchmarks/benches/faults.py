@@ -2,26 +2,37 @@
 
 import argparse
 import os
-import platform
 import tempfile
-import time
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from random import Random
 from typing import TYPE_CHECKING
 
+from endoscope_benchmarks.bench import (
+    add_only,
+    chosen,
+    table_head,
+    table_row,
+    today_and_machine,
+)
 from endoscope_bringup.subcommands import COUNT, seed
 
 if TYPE_CHECKING:
     from endoscope_benchmarks.process_faults.process_faults import Outcome
 
-_HEADING = (
-    '| fault | N | state before the next enable | to standstill [ms] median, largest '
-    '| largest step of motor/servo_jp [mrad], share of its bound | largest step of a shaft [mrad] '
-    '| largest speed of a shaft [rad/s] | largest motion without enable [mrad] '
-    '| enable to motion [s] median, largest | recording | load |\n'
-    '|---|---|---|---|---|---|---|---|---|---|---|'
+_COLUMNS = (
+    'fault',
+    'N',
+    'state before the next enable',
+    'to standstill [ms] median, largest',
+    'largest step of motor/servo_jp [mrad], share of its bound',
+    'largest step of a shaft [mrad]',
+    'largest speed of a shaft [rad/s]',
+    'largest motion without enable [mrad]',
+    'enable to motion [s] median, largest',
+    'recording',
+    'load',
 )
 # A step is bounded but for rounding.
 _SHARE = 1.001
@@ -43,7 +54,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument('--rate', type=COUNT, default=500, help='beats/s (default: %(default)s)')
     parser.add_argument('--composed', action='store_true', help='all nodes in one process')
     parser.add_argument('--seed', type=seed, default=1, help='of all chance (default: 1)')
-    parser.add_argument('--only', nargs='+', metavar='FAULT', help='faults to try (default: all)')
+    add_only(parser, 'fault')
     parser.add_argument('--log', type=Path, help='file for a line on each repetition')
 
 
@@ -55,16 +66,11 @@ def run(args: argparse.Namespace) -> int:
         undergo,
     )
     from endoscope_benchmarks.process_faults.process_rig import ProcessRig
-    from endoscope_core.errors import EndoscopeError
 
-    faults = COMPOSED_FAULTS if args.composed else PROCESS_FAULTS
-    for name in args.only or ():
-        if name not in faults:
-            raise EndoscopeError(f"no fault '{name}'; known are {', '.join(faults)}")
+    faults = chosen('fault', args.only, COMPOSED_FAULTS if args.composed else PROCESS_FAULTS)
     print(
         f'{"one process" if args.composed else "a process for each node"}, {args.rate} Hz, seed '
-        f'{args.seed}, {time.strftime("%Y-%m-%d")}, {os.cpu_count()} cores, '
-        f'{platform.processor() or platform.machine()}\n\n{_HEADING}',
+        f'{args.seed}, {today_and_machine()}\n\n{table_head(*_COLUMNS)}',
         flush=True,
     )
     wrong = 0
@@ -73,10 +79,10 @@ def run(args: argparse.Namespace) -> int:
         tempfile.TemporaryDirectory() as folder,
         ProcessRig(args.rate, args.composed, Path(folder), random) as rig,
     ):
-        for name in args.only or faults:
+        for name, fault in faults.items():
             outcomes, loads = [], []
             for k in range(args.repetitions):
-                outcomes.append(undergo(faults[name], rig))
+                outcomes.append(undergo(fault, rig))
                 loads.append(os.getloadavg()[0])
                 if args.log:
                     with args.log.open('a', encoding='utf-8') as log:
@@ -101,9 +107,9 @@ def _row(name: str, outcomes: Sequence['Outcome'], loads: Sequence[float]) -> st
     missing = max(0.0, *(o.bag for o in outcomes))
     lost = sum(max(0.0, -o.bag) for o in outcomes)
     step = max(o.goal_step for o in outcomes)
-    columns = (
+    return table_row(
         name,
-        f'{len(outcomes)}',
+        len(outcomes),
         ', '.join(f'{state} {n}' for state, n in states.most_common())
         + (f'; ended before by itself {ended}' if ended else ''),
         _middle_and_most(still, '.0f'),
@@ -115,7 +121,6 @@ def _row(name: str, outcomes: Sequence['Outcome'], loads: Sequence[float]) -> st
         f'complete to {missing:.2f} s before' if missing else f'{lost:.0f} lost',
         f'{min(loads):.0f} to {max(loads):.0f}',
     )
-    return f'| {" | ".join(columns)} |'
 
 
 def _middle_and_most(values: Sequence[float], form: str) -> str:

@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from endoscope_benchmarks.benches.cases import add_jobs
+from endoscope_benchmarks.bench import add_jobs, add_only, require_known, table_head
 from endoscope_bringup.subcommands import COUNT, seed
 
 
@@ -20,20 +20,16 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         '--cases', type=COUNT, default=300, metavar='N', help='files of each kind (300)'
     )
     parser.add_argument('--seed', type=seed, default=0, help='of the spoiling (0)')
-    parser.add_argument('--only', nargs='+', metavar='KIND', help='kinds to try (default: all)')
+    add_only(parser, 'kind')
     add_jobs(parser, default=2)
 
 
 def run(args: argparse.Namespace) -> int:
     """Print a row for each kind; return 1 if a file did more than it may."""
     from endoscope_benchmarks.hostile_files.trial import KINDS, OUTCOMES, Outcomes, try_files
-    from endoscope_core.errors import EndoscopeError
 
-    unknown = [kind for kind in args.only or () if kind not in KINDS]
-    if unknown:
-        raise EndoscopeError(f'no kind {unknown[0]!r}; known are {", ".join(KINDS)}')
-    columns = ('kind', 'cases', *OUTCOMES, 'peak memory [MB]', 'longest [s]')
-    print(f'| {" | ".join(columns)} |\n|{"---|" * len(columns)}')
+    require_known('kind', args.only or (), KINDS)
+    print(table_head('kind', 'cases', *OUTCOMES, 'peak memory [MB]', 'longest [s]'))
     good = True
     for kind in args.only or KINDS:
         found = Outcomes(kind)

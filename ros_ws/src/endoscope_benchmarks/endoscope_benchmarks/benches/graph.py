@@ -2,7 +2,7 @@
 
 import argparse
 
-from endoscope_bringup.subcommands import within
+from endoscope_benchmarks.bench import add_seconds
 
 PROCESS_RATES = (1000, 500, 250, 125)
 
@@ -16,17 +16,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'recorder; in lock-step as fast as it goes; and each in a process of its own at falling '
         'rates until one is carried. Exits 1 where a target is missed.',
     )
-    parser.add_argument(
-        '--seconds',
-        type=within(0.0, 86400.0, float),
-        default=60.0,
-        help='length of the run in one process (default: %(default)g)',
-    )
-    parser.add_argument(
-        '--process-seconds',
-        type=within(0.0, 86400.0, float),
-        default=10.0,
-        help='length of each run in many processes, 0 for none (default: %(default)g)',
+    add_seconds(parser, 60.0, 'length of the run in one process')
+    add_seconds(
+        parser, 10.0, 'length of each run in many processes, 0 for none', '--process-seconds'
     )
 
 

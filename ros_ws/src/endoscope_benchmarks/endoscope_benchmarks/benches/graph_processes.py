@@ -7,7 +7,8 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from endoscope_benchmarks.benches.process_cpu import cpu_seconds
+from endoscope_benchmarks.bench import cpu_seconds
+from endoscope_benchmarks.private_domain import private_domain
 from endoscope_benchmarks.process_faults.node_processes import NODES, NodeProcesses
 from endoscope_benchmarks.process_faults.operator import Operator
 from endoscope_core.safety import OperatingState
@@ -48,11 +49,8 @@ class ProcessesFigure:
 
 
 def run_processes_bench(rate: int, seconds: float) -> ProcessesFigure:
-    """Measure the graph with a process for each node, at beats per second that divide 1000.
-
-    RuntimeError if a node does not start, or the slave cannot be enabled.
-    """
-    domain = 100 + (os.getpid() + rate) % 130
+    """Measure the graph with a process for each node, at beats per second that divide 1000."""
+    domain = private_domain()
     with (
         tempfile.TemporaryDirectory() as folder,
         NodeProcesses(domain, Path(folder)) as processes,

@@ -2,7 +2,7 @@
 
 import argparse
 
-from endoscope_benchmarks.benches.cases import add_jobs, add_seeds, require_known, side_by_side
+from endoscope_benchmarks.bench import add_jobs, add_seeds, require_known, side_by_side, table_row
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -20,14 +20,15 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print a line for each effect; return 0."""
-    from endoscope_benchmarks.concealed.formulas import DRAWN
-    from endoscope_benchmarks.concealed.limits import limit_of
+    from endoscope_benchmarks.concealed.forms import DRAWN
+    from endoscope_benchmarks.concealed.trial import limit_of
 
     require_known('drawn effect', args.effects or (), DRAWN)
     calls = [(effect, args.seeds) for effect in args.effects or DRAWN]
-    for _, found in side_by_side(args.jobs, limit_of, calls):
+    for _, future in side_by_side(args.jobs, limit_of, calls):
+        found = future.result()
         named = f'{100.0 * found.share:.2g} %' if found.share == found.share else 'never'
         weaker = ', '.join(m or 'nothing' for m in found.missed_as) or '-'
         numbers = '; '.join(found.numbers)
-        print(f'| `{found.effect}` | {named} | {numbers} | {weaker} |', flush=True)
+        print(table_row(f'`{found.effect}`', named, numbers, weaker), flush=True)
     return 0

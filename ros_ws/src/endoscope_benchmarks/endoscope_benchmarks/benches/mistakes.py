@@ -4,7 +4,7 @@ import argparse
 from concurrent.futures import Executor
 from pathlib import Path
 
-from endoscope_benchmarks.benches.cases import add_jobs, seeds
+from endoscope_benchmarks.bench import add_jobs, add_seeds, table_head, table_row
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -16,12 +16,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'not said rightly; then right recordings, and prints what was said of them. '
         'Seeds from 1 to 99 are for development; of others, first runs are reported.',
     )
-    parser.add_argument(
-        '--seeds', type=seeds, default=range(1, 2), metavar='A-B', help='of mistakes (1)'
-    )
-    parser.add_argument(
-        '--sound', type=seeds, default=range(1, 11), metavar='A-B', help='of right ones (1-10)'
-    )
+    add_seeds(parser, 'of mistakes (1)', last=1)
+    add_seeds(parser, 'of right ones (1-10)', '--sound', last=10)
     parser.add_argument(
         '--derive', action='store_true', help='derive the deciding numbers from the right ones'
     )
@@ -42,8 +38,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _measure(args: argparse.Namespace, pool: Executor) -> None:
-    from endoscope_benchmarks.mistakes.mistake import MISTAKES
-    from endoscope_benchmarks.mistakes.trial import audited
+    from endoscope_benchmarks.mistakes.mistake import MISTAKES, audited
 
     cases = [(name, seed) for name in MISTAKES for seed in args.seeds]
     cases += [('', seed) for seed in args.sound]
@@ -57,13 +52,17 @@ def _measure(args: argparse.Namespace, pool: Executor) -> None:
     right = sum(row.right for row in wrong)
     missed = sum(not row.mistaken for row in wrong)
     slowest = max(row.seconds for row in rows)
-    print('| mistakes | said rightly | missed | otherwise | none | false alarms | slowest |')
-    print('|---|---|---|---|---|---|---|')
-    print(
-        f'| {len(wrong)} | {right} ({right / max(len(wrong), 1):.1%}) | {missed} | '
-        f'{len(wrong) - right - missed} | {len(sound)} | {sum(not row.right for row in sound)} | '
-        f'{slowest:.1f} s |'
-    )
+    cells = {
+        'mistakes': len(wrong),
+        'said rightly': f'{right} ({right / max(len(wrong), 1):.1%})',
+        'missed': missed,
+        'otherwise': len(wrong) - right - missed,
+        'none': len(sound),
+        'false alarms': sum(not row.right for row in sound),
+        'slowest': f'{slowest:.1f} s',
+    }
+    print(table_head(*cells))
+    print(table_row(*cells.values()))
 
 
 def _derive(args: argparse.Namespace, pool: Executor) -> None:

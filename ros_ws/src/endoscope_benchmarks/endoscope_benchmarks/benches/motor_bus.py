@@ -4,6 +4,7 @@ import argparse
 import time
 from dataclasses import dataclass
 
+from endoscope_benchmarks.bench import add_seconds
 from endoscope_bringup.subcommands import within
 
 _STEP_S = 1e-3
@@ -43,12 +44,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         default=[57_600, 1_000_000, 4_000_000],
         help='bits per second (default: %(default)s)',
     )
-    parser.add_argument(
-        '--seconds',
-        type=within(0.0, 86400.0, float),
-        default=10.0,
-        help='length of a run (default: %(default)g)',
-    )
+    add_seconds(parser, 10.0, 'length of a run')
     parser.add_argument('--fast', action='store_true', help='use fast sync read')
 
 
@@ -64,10 +60,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def run_motor_bus_bench(baud: int, seconds: float, fast: bool = False) -> MotorBusFigure:
-    """Run two servos as fast as the bus goes, by fast sync read if asked to.
-
-    RuntimeError if the servos cannot be enabled.
-    """
+    """Run two servos as fast as the bus goes, by fast sync read if asked to."""
     from endoscope_devices.dynamixel.bus_thread import BusThread
     from endoscope_devices.dynamixel.doctor import bytes_of_cycle, cycles_per_second
     from endoscope_devices.dynamixel.settings import BusSettings, ServoMount

@@ -5,10 +5,17 @@ import re
 import tempfile
 from pathlib import Path
 
-_HEADING = (
-    '| fault | state | to FAULT [ms] | to standstill [ms] | longest gap of motor/measured_js '
-    '[ms] | largest error in the bag [mrad] | FAULT in the bag | cause |\n'
-    '|---|---|---|---|---|---|---|---|'
+from endoscope_benchmarks.bench import add_only, chosen, table_head
+
+_COLUMNS = (
+    'fault',
+    'state',
+    'to FAULT [ms]',
+    'to standstill [ms]',
+    'longest gap of motor/measured_js [ms]',
+    'largest error in the bag [mrad]',
+    'FAULT in the bag',
+    'cause',
 )
 
 
@@ -21,21 +28,17 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'servos, breaks one thing after the other in motion, and prints a table. Exits 1 '
         'where the slave does not end as it must.',
     )
-    parser.add_argument('--only', nargs='+', metavar='FAULT', help='faults to try (default: all)')
+    add_only(parser, 'fault')
 
 
 def run(args: argparse.Namespace) -> int:
     """Print a row for each fault; return 1 if one ended otherwise than it must."""
     from endoscope_benchmarks.device_faults.motor_faults import MOTOR_FAULTS, undergo
-    from endoscope_core.errors import EndoscopeError
 
-    unknown = [name for name in args.only or () if name not in MOTOR_FAULTS]
-    if unknown:
-        raise EndoscopeError(f"no fault '{unknown[0]}'; known are {', '.join(MOTOR_FAULTS)}")
+    faults = chosen('fault', args.only, MOTOR_FAULTS)
     wrong = 0
-    print(_HEADING)
-    for name in args.only or MOTOR_FAULTS:
-        fault = MOTOR_FAULTS[name]
+    print(table_head(*_COLUMNS))
+    for fault in faults.values():
         with tempfile.TemporaryDirectory() as folder:
             outcome = undergo(fault, Path(folder))
         print(outcome, flush=True)

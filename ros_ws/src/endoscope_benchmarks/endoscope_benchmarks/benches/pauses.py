@@ -5,7 +5,13 @@ import itertools
 import math
 from typing import TYPE_CHECKING
 
-from endoscope_benchmarks.benches.cases import add_jobs, add_seeds, side_by_side
+from endoscope_benchmarks.bench import (
+    add_jobs,
+    add_seeds,
+    side_by_side,
+    table_head,
+    table_row,
+)
 from endoscope_bringup.subcommands import within
 
 if TYPE_CHECKING:
@@ -39,7 +45,8 @@ def run(args: argparse.Namespace) -> int:
 
     rows = []
     calls = [(seed, args.longest) for seed in args.seeds]
-    for done, row in side_by_side(args.jobs, rested_and_moved, calls):
+    for done, (_, future) in enumerate(side_by_side(args.jobs, rested_and_moved, calls), 1):
+        row = future.result()
         rows.append(row)
         print(
             f'{done} of {len(calls)}: seed {row.seed}, {row.rest_s:.0f} s, then {row.asked}: '
@@ -50,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _print_table(rows: list['Row']) -> int:
-    print('| rest | rests | obeyed | refused and said | silent | latest [s] |\n' + '|---' * 6 + '|')
+    print(table_head('rest', 'rests', 'obeyed', 'refused and said', 'silent', 'latest [s]'))
     ends = (0.0, 10.0, 100.0, 1000.0, math.inf)
     bands = [*itertools.pairwise(ends), (0.0, math.inf)]
     for low, high in bands:
@@ -59,8 +66,6 @@ def _print_table(rows: list['Row']) -> int:
         silent = sum(row.became == 'silent' for row in of_band)
         latest = max((row.within_s for row in of_band), default=0.0)
         name = 'all' if (low, high) == bands[-1] else f'from {low:.0f} s'
-        print(
-            f'| {name} | {len(of_band)} | {obeyed} | {len(of_band) - obeyed - silent} | {silent} | '
-            f'{latest:.2f} |'
-        )
+        refused = len(of_band) - obeyed - silent
+        print(table_row(name, len(of_band), obeyed, refused, silent, f'{latest:.2f}'))
     return int(any(row.became == 'silent' for row in rows))

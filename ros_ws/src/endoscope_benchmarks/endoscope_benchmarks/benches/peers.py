@@ -2,10 +2,10 @@
 
 import argparse
 
-from endoscope_benchmarks.benches.cases import (
+from endoscope_benchmarks.bench import (
     add_case_options,
-    of_cases,
     require_known,
+    side_by_side,
     write_rows,
 )
 
@@ -45,9 +45,9 @@ def run(args: argparse.Namespace) -> int:
     print(versions(names), flush=True)
     with worker_pool(args.jobs) as pool:
         shown = dict(zip(names, pool.map(example, names), strict=True))
-    cases = [(name, seed) for name in args.stratum for seed in args.seeds]
+    cases = [(names, name, seed) for name in args.stratum for seed in args.seeds]
     found = []
-    for _, future in of_cases(args.jobs, cases, answers, names):
+    for _, future in side_by_side(args.jobs, answers, cases):
         found += future.result()
         print('\n'.join(answer.line() for answer in future.result()), flush=True)
     print('\n' + table(shown, found))

@@ -1,10 +1,9 @@
 """`endoscope bench real`: one physics for real recordings of a flexible endoscope."""
 
 import argparse
-import sys
 from pathlib import Path
 
-from endoscope_benchmarks.benches.cases import add_jobs
+from endoscope_benchmarks.bench import add_jobs, report
 
 PAGE = 'real.html'
 
@@ -52,18 +51,14 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_core.atomic_output import write_text
 
     require_recordings(args.folder)
-
-    def tell(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
-
     # A fit's matrices are tall and narrow: threads would only wait for each other.
     with threadpool_limits(1, 'blas'):
         if args.taken_out:
-            print(as_table(taken_out(args.folder, args.jobs, tell)))
+            print(as_table(taken_out(args.folder, args.jobs, report)))
             return 0
-        tubes = explained_tubes(args.folder, args.jobs, tell)
-        state = explained_state(args.folder, tubes, args.jobs, tell)
-        unknown = unknown_tubes(args.folder, tubes, tell)
+        tubes = explained_tubes(args.folder, args.jobs, report)
+        state = explained_state(args.folder, tubes, args.jobs, report)
+        unknown = unknown_tubes(args.folder, tubes, report)
         box = models_on_real_recordings(real_recordings(args.folder), 'prandtl_ishlinskii', 0)
         parts = sections(
             tubes,

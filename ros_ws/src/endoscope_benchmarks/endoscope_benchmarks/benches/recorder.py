@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from endoscope_benchmarks.benches.process_cpu import cpu_seconds
-from endoscope_bringup.subcommands import COUNT, within
+from endoscope_benchmarks.bench import add_seconds, cpu_seconds
+from endoscope_bringup.subcommands import COUNT
 
 TARGET_RATE = 20_000
 TARGET_CPU_SHARE = 0.5
@@ -60,12 +60,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         default=[5_000, 10_000, TARGET_RATE],
         help='messages per second (default: %(default)s)',
     )
-    parser.add_argument(
-        '--seconds',
-        type=within(0.0, 86400.0, float),
-        default=10.0,
-        help='length of a run (default: %(default)g)',
-    )
+    add_seconds(parser, 10.0, 'length of a run')
 
 
 def run(args: argparse.Namespace) -> int:
@@ -80,10 +75,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def run_recorder_bench(rate: int, seconds: float) -> RecorderFigure:
-    """Send `rate` messages per second in all for `seconds` to a recorder process and measure it.
-
-    RuntimeError if the recorder did not find the topics, or failed.
-    """
+    """Send `rate` messages per second in all for `seconds` to a recorder process and measure it."""
     from endoscope_bags import open_bag
 
     topics = [f'/bench_{os.getpid()}/topic_{k}' for k in range(_TOPICS)]

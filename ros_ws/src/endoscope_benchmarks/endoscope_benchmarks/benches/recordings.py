@@ -5,7 +5,13 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from endoscope_benchmarks.benches.cases import add_jobs, add_seeds, side_by_side
+from endoscope_benchmarks.bench import (
+    add_jobs,
+    add_seeds,
+    side_by_side,
+    table_head,
+    table_row,
+)
 from endoscope_bringup.subcommands import COUNT
 
 if TYPE_CHECKING:
@@ -46,7 +52,8 @@ def run(args: argparse.Namespace) -> int:
         if file.exists()
     }
     calls = [(seed, args.out) for seed in seeds if seed not in rows]
-    for _, row in side_by_side(args.jobs, recorded_and_explained, calls):
+    for _, future in side_by_side(args.jobs, recorded_and_explained, calls):
+        row = future.result()
         rows[row.seed] = row
         write_text(files[row.seed], json.dumps(asdict(row), indent=1) + '\n')
         print(f'{len(rows)} of {len(seeds)}: {_line(row)}', flush=True)
@@ -63,10 +70,9 @@ def _line(row: 'Row') -> str:
 
 def _print_table(rows: list['Row']) -> None:
     verdicts = sorted({row.verdict for row in rows})
-    print(f'| made in | recordings | {" | ".join(verdicts)} | physics named |')
-    print('|---' * (len(verdicts) + 3) + '|')
+    print(table_head('made in', 'recordings', *verdicts, 'physics named'))
     for way in ('lock-step', 'real time', ''):
         of_way = [row for row in rows if row.way.startswith(way)]
         counts = [sum(row.verdict == verdict for row in of_way) for verdict in verdicts]
         named = sum(row.names_physics for row in of_way)
-        print(f'| {way or "all"} | {len(of_way)} | {" | ".join(map(str, counts))} | {named} |')
+        print(table_row(way or 'all', len(of_way), *counts, named))

@@ -90,10 +90,8 @@ def _logistic(named: Array, right: NDArray[np.bool_]) -> tuple[float, float, flo
 
 
 def reliability(bank: Bank) -> str:
-    """How often names are right that were given with some probability, a line for each tenth.
-
-    The probability of a name follows from the other cases, ten parts of them in turn.
-    """
+    """How often names are right that were given with some probability, a line for each tenth."""
+    # The probability of a name follows from the other cases, ten parts of them in turn.
     given = np.empty(len(bank.right))
     for part in range(PARTS):
         own = bank.case % PARTS == part

@@ -8,15 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_benchmarks.concealed import motions
-from endoscope_benchmarks.concealed.case import (
+from endoscope_benchmarks.concealed.forms import (
+    DRAWN,
+    OF_THE_OTHER,
+    drawn_form,
+    drawn_formula,
+    visited,
+)
+from endoscope_benchmarks.concealed.judge import (
     Case,
     Law,
     effects_at,
     law_at_place,
     law_of_effect,
 )
-from endoscope_benchmarks.concealed.forms import drawn_form, visited
-from endoscope_benchmarks.concealed.formulas import DRAWN, OF_THE_OTHER, drawn_formula
 from endoscope_benchmarks.concealed.readings import Noise, Readings, read, record
 from endoscope_benchmarks.concealed.rigs import (
     coarse_sensors,
@@ -193,10 +198,8 @@ def other_simulator(generator: Generator, seed: int) -> Case:
 
 
 def as_strong(effect: str, seed: int, share: float) -> Case:
-    """One effect that moves a given share of the signal, on the same rig for the same seed.
-
-    RuntimeError if it moves no signal by as much.
-    """
+    """One effect that moves a share of the signal; RuntimeError if it moves none by as much."""
+    # The rig is the same for the same seed.
     generator = np.random.default_rng([_BY_STRENGTH, DRAWN.index(effect), seed])
     rig = _rig(generator, _joints_of(effect))
     return _finished(generator, seed, rig, *_with_effect(generator, rig, effect, (share, share)))
@@ -221,10 +224,7 @@ _BY_STRENGTH = 11
 
 
 def drawn_case(stratum: str, seed: int) -> Case:
-    """Draw a case, the same one for the same seed; KeyError if there is no such stratum.
-
-    RuntimeError if no law of some reaches its share of the signal.
-    """
+    """Draw a case, the same one for the same seed; KeyError if there is no such stratum."""
     generator = np.random.default_rng([list(STRATA).index(stratum), seed])
     return replace(STRATA[stratum](generator, seed), stratum=stratum)
 
@@ -292,7 +292,7 @@ def _concealed(
     drawn: Callable[[], tuple[Added, float]],
     aims: tuple[float, float],
 ) -> tuple[PlantDescription, float]:
-    """The rig with a law that moves a share of the signal, drawn anew where it cannot."""
+    """The rig with a law that moves a share of the signal, drawn again where it cannot."""
 
     def draw() -> tuple[Added, Callable[[float], Readings], float]:
         added, begin = drawn()

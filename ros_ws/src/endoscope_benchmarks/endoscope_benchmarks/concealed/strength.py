@@ -36,11 +36,8 @@ def moved(bare: Readings, other: Readings) -> float:
 def scaled_to(
     aim: float, seen: Callable[[float], Readings], start: float = 1.0
 ) -> tuple[float, float]:
-    """Find the strength at which a law moves what is measured by `aim`, and the share reached.
-
-    What is `seen` at a strength, at zero without the law, raises ValueError where the law cannot be
-    as strong. OutOfReachError if no strength reaches the share, see `moved`.
-    """
+    """The strength at which a law moves what is `seen` at it by `aim`, and the share reached."""
+    # Where a law cannot be as strong, `seen` raises ValueError.
     bare = seen(0.0)
     strength, below, above = start, 0.0, math.inf
     for _ in range(_TRIES):
@@ -71,12 +68,9 @@ def drawn_as_strong[L](
     aims: tuple[float, float],
     draw: Callable[[], tuple[L, Callable[[float], Readings], float]],
 ) -> tuple[L, float, float]:
-    """Draw a law, its strength and the share it moves, anew where it cannot move as much as drawn.
-
-    The share lies between the aims, drawn by its logarithm. `draw` gives a law, what is read by its
-    strength, and a strength to begin at; see `scaled_to`. RuntimeError if no law of some moves its
-    share.
-    """
+    """Draw a law, its strength and the share it moves, between two aims by its logarithm."""
+    # `draw` gives a law, what is read by its strength, and a strength to begin at. A law that
+    # cannot move as much as drawn is drawn again.
     for _ in range(_LAWS):
         law, seen, begin = draw()
         aim = float(np.exp(generator.uniform(*np.log(aims))))

@@ -1,18 +1,29 @@
-"""One case explained and judged, and the table of many."""
+"""One case explained and judged, the record and the table of many, and how weak a law may be."""
 
+import json
 import math
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from math import isclose
+from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from endoscope_benchmarks.concealed.case import Case, Law
-from endoscope_benchmarks.concealed.judge import Judgement, is_instead, is_of, judged, statements
+from endoscope_benchmarks.concealed.judge import (
+    Case,
+    Judgement,
+    Law,
+    is_instead,
+    is_of,
+    judged,
+    statements,
+)
 from endoscope_benchmarks.concealed.readings import misfit
-from endoscope_benchmarks.concealed.strata import drawn_case
+from endoscope_benchmarks.concealed.strata import as_strong, drawn_case
 from endoscope_benchmarks.concealed.strength import left
+from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.criteria import REACH
@@ -75,10 +86,7 @@ class Row(Judgement):
 
     @property
     def is_told_apart(self) -> bool:
-        """Whether a law is told from other numbers, and a second recording is not enough without.
-
-        Where nothing is concealed, nothing has to be told.
-        """
+        """Whether laws, if any, are told from other numbers and a second recording misses them."""
         return not self.concealed or (bool(self.told) and not self.refitted <= GOOD)
 
     def line(self) -> str:
@@ -148,11 +156,9 @@ def row_of(case: Case) -> Row:
 
 
 def told_from_numbers(case: Case) -> tuple[Law, ...]:
-    """Laws of which a refit of the rig's numbers leaves more than noise, each alone in the rig.
-
-    A smaller pretension and slack are one thing in the wires of most motions, and gravity is one
-    with the joint's stiffness and rest angle; nobody can name what is not there to be seen.
-    """
+    """Laws of which a refit of the rig's numbers leaves more than noise, each alone in the rig."""
+    # A smaller pretension and slack are one thing in the wires of most motions, and gravity is one
+    # with the joint's stiffness and rest angle: what is not there to be seen cannot be named.
     if case.true == case.bare:
         return case.laws
     command = case.recording.command.values
@@ -272,4 +278,99 @@ def _cells(rows: Sequence[Row]) -> tuple[str, ...]:
         second('augmented', 0.8),
         f'{np.median(seconds):.1f}',
         f'{np.quantile(seconds, 0.95):.1f}',
+    )
+
+
+CaseKey = tuple[str, int]
+"""Stratum and seed."""
+
+SAME = 0.02
+"""Relative difference of a misfit that two machines may have: fits end within a thousandth of their
+cost, in which a misfit of twice the noise has a share of a hundredth."""
+
+
+def rows_of(file: Path) -> dict[CaseKey, Row]:
+    """Read a record; EndoscopeError for a line that is none of a row."""
+    rows = {}
+    for number, line in enumerate(file.read_text(encoding='utf-8').splitlines(), 1):
+        try:
+            fields = json.loads(line)
+            lists = {k: tuple(v) for k, v in fields.items() if isinstance(v, list)}
+            row = Row(**{**fields, **lists})
+        except (ValueError, TypeError) as error:
+            raise EndoscopeError(f'{file}, line {number}: no row of a case: {error}') from error
+        rows[row.stratum, row.seed] = row
+    return rows
+
+
+def append(file: Path, row: Row) -> None:
+    """Add a row at the end of a record."""
+    with file.open('a', encoding='utf-8') as lines:
+        lines.write(json.dumps(asdict(row)) + '\n')
+
+
+def differences(before: Row, now: Row) -> Iterator[str]:
+    """In what an explanation differs from the one on record: verdict, names, misfits, numbers."""
+    for name in ('verdict', 'said'):
+        was, is_ = getattr(before, name), getattr(now, name)
+        if was != is_:
+            yield f'{name} {_shown(was)} -> {_shown(is_)}'
+    for name in ('nominal', 'refitted', 'augmented'):
+        was, is_ = getattr(before, name), getattr(now, name)
+        if not isclose(was, is_, rel_tol=SAME):
+            yield f'second recording, {name}: {was:.3g} -> {is_:.3g}'
+    if before.held != now.held or before.intervals != now.intervals:
+        yield (
+            f'intervals that hold: {before.held} of {before.intervals} -> '
+            f'{now.held} of {now.intervals}'
+        )
+
+
+def _shown(value: str | tuple[str, ...]) -> str:
+    return value if isinstance(value, str) else ' + '.join(value) or 'nothing'
+
+
+SHARES = (0.1, 0.032, 0.01, 0.0032, 0.001)
+"""Shares of its signal that the effect moves, each about a third of the one before."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """The weakest strength at which an effect is named."""
+
+    effect: str
+    share: float  # of the signal that it moves most; NaN where it is not named at any
+    numbers: tuple[str, ...]  # of the effect at that strength, one for each rig
+    missed_as: tuple[str, ...]  # what was said where it was weaker; empty for nothing
+
+
+def limit_of(effect: str, seeds: range) -> Limit:
+    """Make an effect weaker until it is not named on each of some rigs, one a seed."""
+    found, numbers = float('nan'), tuple[str, ...]()
+    for share in SHARES:
+        cases = [case for seed in seeds if (case := _drawn(effect, seed, share)) is not None]
+        rows = [row_of(case) for case in cases]
+        missed = tuple('+'.join(row.said) for row in rows if not row.first)
+        if missed:
+            return Limit(effect, found, numbers, missed)
+        if cases:
+            found, numbers = share, tuple(_in_units(case, effect) for case in cases)
+    return Limit(effect, found, numbers, ())
+
+
+def _drawn(effect: str, seed: int, share: float) -> Case | None:
+    """The case; None where the effect cannot move as much, since it has an end."""
+    try:
+        return as_strong(effect, seed, share)
+    except RuntimeError:
+        return None
+
+
+def _in_units(case: Case, effect: str) -> str:
+    """What a person knows the strength by: the numbers that vanish with the effect, with units."""
+    spec = next(each for each in case.true.effects if each.id == effect)
+    return ', '.join(
+        f'{p.name} {spec.parameters[p.name]:.3g}{"" if p.unit == "-" else f" {p.unit}"}'
+        for p in CATALOGUE[effect].parameters
+        if p.off == p.off and spec.parameters[p.name] != p.off
     )

@@ -84,10 +84,7 @@ class Chromium(ClosedOnExit):
         return number
 
     def call(self, method: str, session: str = '', **parameters: Any) -> dict[str, Any]:
-        """Order something of the browser, or of the tab of a session; the answer.
-
-        BrowserError if it is refused, or there is no answer within a minute.
-        """
+        """Order something of the browser or of a session's tab; BrowserError if it refuses."""
         number = self.post(method, session, **parameters)
         end = time.monotonic() + _PATIENCE_S
         while True:

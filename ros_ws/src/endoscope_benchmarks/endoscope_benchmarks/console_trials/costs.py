@@ -13,7 +13,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
-from endoscope_benchmarks.benches.process_cpu import cpu_seconds
+from endoscope_benchmarks.bench import cpu_seconds
 from endoscope_benchmarks.console_trials.hand import Hand
 from endoscope_benchmarks.console_trials.served_console import ServedConsole
 
@@ -35,10 +35,8 @@ _FRAMES = """new Promise((done) => {
 
 
 def first_motion(hand: Hand, began_s: float) -> str:
-    """Time from a start of the program, by the monotonic clock, to a slave in motion, in words.
-
-    The hand's browser was started when all nodes were heard.
-    """
+    """Time from a start of the program, by the monotonic clock, to a slave in motion, in words."""
+    # The hand's browser was started when all nodes were heard.
     hand.move()
     took_s = time.monotonic() - began_s
     painted_ms = hand.tab.value(_PAINTED)
@@ -50,10 +48,8 @@ def first_motion(hand: Hand, began_s: float) -> str:
 
 
 def input_latency(hand: Hand, inputs: int) -> Iterator[str]:
-    """In words, from a pressed key to the first change of the handle, and of ``motor/servo_jp``.
-
-    The operator has Space down and the slave at rest before each.
-    """
+    """From a pressed key to the first change of the handle, and of ``motor/servo_jp``, in words."""
+    # The operator has Space down and the slave at rest before each.
     console = hand.console
     took_ms: dict[str, list[float]] = {'master/measured_js': [], 'motor/servo_jp': []}
     while min(map(len, took_ms.values())) < inputs:
@@ -91,10 +87,8 @@ def costs_of_viewers(console: ServedConsole, seconds: float) -> Iterator[str]:
 
 
 def costs_with_browser(hand: Hand, seconds: float) -> Iterator[str]:
-    """In words, the server's CPU time, the graph's ticks and a page's frames beside the browser.
-
-    The operator's page is the first client. Each figure takes so many seconds.
-    """
+    """CPU time of the server, ticks of the graph and frames of a page in a browser, in words."""
+    # The operator's page is the first client.
     console = hand.console
     hand.take_controls()
     yield _cost(console, seconds, 'the browser operates')

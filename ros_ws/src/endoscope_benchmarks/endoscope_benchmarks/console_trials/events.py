@@ -99,11 +99,9 @@ EVENTS = {
 
 
 def undergo(event: Event, hand: Hand, settled_s: float, watched_s: float) -> Outcome:
-    """Let something happen to an operator who holds the slave in motion.
-
-    What moves within `settled_s` of the word on the clutch still counts to the motion; the motors
-    are watched for `watched_s` after that. ConsoleError if the clutch is not released.
-    """
+    """Let something happen to an operator who holds the slave in motion."""
+    # What moves within `settled_s` of the word on the clutch still counts to the motion; the motors
+    # are watched for `watched_s` after that.
     console = hand.console
     for _ in range(_TRIES):
         console.forget()

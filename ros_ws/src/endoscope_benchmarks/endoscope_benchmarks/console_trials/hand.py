@@ -97,7 +97,7 @@ class Hand(ClosedOnExit):
         self._held = []
 
     def hold(self, *codes: str) -> None:
-        """Hold keys until the lamp says that the slave follows; anew where it did not."""
+        """Hold keys until the lamp says that the slave follows; again where it did not."""
         end = time.monotonic() + PATIENCE_S
         since = -_FOLLOWED_S
         while self._seen(_LAMP) != 'FOLLOWING':

@@ -80,11 +80,7 @@ class Heard:
 
 
 class ServedConsole(ClosedOnExit):
-    """The program in a process of its own, and a node that looks on.
-
-    It is started in the folder, and writes its bag there. The origins are addresses of relays under
-    which the page is reached, too.
-    """
+    """The program, started in a folder and reached under origins of relays too; and a listener."""
 
     def __init__(
         self,

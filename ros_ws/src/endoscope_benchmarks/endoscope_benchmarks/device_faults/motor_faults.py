@@ -10,6 +10,7 @@ import numpy as np
 from rclpy.parameter import Parameter
 
 from endoscope_bags import open_bag
+from endoscope_benchmarks.bench import table_row
 from endoscope_benchmarks.device_faults.motor_rig import MotorRig
 from endoscope_nodes.nodes.supervisor import SupervisorNode
 
@@ -49,11 +50,9 @@ class FaultOutcome:
         def ms(seconds: float | None) -> str:
             return '-' if seconds is None else f'{seconds * 1e3:.0f}'
 
-        return (
-            f'| {self.what} | {self.state} | {ms(self.fault_s)} | {ms(self.stopped_s)} '
-            f'| {ms(self.longest_gap_s)} | {self.largest_error * 1e3:.1f} | {self.faults_in_bag} '
-            f'| {self.cause} |'
-        )
+        times = (ms(each) for each in (self.fault_s, self.stopped_s, self.longest_gap_s))
+        error = f'{self.largest_error * 1e3:.1f}'
+        return table_row(self.what, self.state, *times, error, self.faults_in_bag, self.cause)
 
 
 def _set(action: str, *arguments: float) -> Callable[[MotorRig], object]:
@@ -129,11 +128,7 @@ def undergo(
     patience: float | None = None,
     domain: int | None = None,
 ) -> FaultOutcome:
-    """Make a fault happen in motion, and look at what follows, for `aftermath` s at least.
-
-    Silence of the servos for `patience` s is a fault; the usual is meant if None. The ROS domain
-    goes with the process if None.
-    """
+    """Make a fault happen in motion, and look at what follows, for `aftermath` s at least."""
     with MotorRig(folder, fault.apart, patience, domain) as rig:
         rig.enable_and_move()
         began, began_ns = time.monotonic(), time.time_ns()

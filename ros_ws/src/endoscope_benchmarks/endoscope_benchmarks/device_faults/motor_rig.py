@@ -17,6 +17,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_msgs.msg import String
 
+from endoscope_benchmarks.private_domain import process_domain
 from endoscope_core.exit_status import ClosedOnExit
 from endoscope_devices.dynamixel.control_table import COUNT
 from endoscope_emulators.dynamixel.process import EmulatorProcess
@@ -73,7 +74,7 @@ class MotorRig(ClosedOnExit):
         self.states: list[tuple[float, str]] = []
         self.shafts: list[tuple[float, JointSample]] = []
         self.messages: list[tuple[float, str, str]] = []
-        domain = 100 + os.getpid() % 130 if domain is None else domain
+        domain = process_domain() if domain is None else domain
         overrides = self._parameters(apart, patience, folder / 'rig.yaml')
         self.runtime = Runtime(
             args=['--ros-args', '--log-level', 'fatal'],
@@ -217,7 +218,7 @@ class MotorRig(ClosedOnExit):
 
 
 def _start(name: str, parameters: dict[str, Any], domain: int) -> subprocess.Popen:
-    code = f'import sys; from endoscope_nodes.nodes.{name} import main; sys.exit(main())'
+    code = f'import sys; from endoscope_nodes import program; sys.exit(program.{name}.start())'
     arguments = [word for k, v in parameters.items() for word in ('-p', f'{k}:={v}')]
     return subprocess.Popen(
         [sys.executable, '-c', code, '--ros-args', *arguments],

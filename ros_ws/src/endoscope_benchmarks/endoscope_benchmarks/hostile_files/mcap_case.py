@@ -41,7 +41,7 @@ Message = tuple[str, int, bytes]
 
 
 class McapCase:
-    """A recording that is spoiled anew for each case, read and recovered."""
+    """A recording that is spoiled again for each case, read and recovered."""
 
     name = 'mcap'
 

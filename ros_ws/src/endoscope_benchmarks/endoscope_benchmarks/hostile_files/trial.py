@@ -18,6 +18,7 @@ from typing import Protocol
 import numpy as np
 from numpy.random import Generator
 
+from endoscope_benchmarks.bench import table_row
 from endoscope_benchmarks.hostile_files.mcap_case import McapCase
 from endoscope_benchmarks.hostile_files.sqlite3_case import Sqlite3Case
 from endoscope_benchmarks.hostile_files.text_case import (
@@ -90,7 +91,7 @@ class Outcomes:
     def __str__(self) -> str:
         cells = [self.kind, self.counts.total(), *(self.counts[each] for each in OUTCOMES)]
         cells += [f'{self.peak / 1e6:.0f}', f'{self.longest:.1f}']
-        return f'| {" | ".join(map(str, cells))} |'
+        return table_row(*cells)
 
 
 class _OvertimeError(BaseException):
@@ -98,10 +99,8 @@ class _OvertimeError(BaseException):
 
 
 def try_files(kind: str, cases: int, seed: int, jobs: int) -> Iterator[Outcomes]:
-    """Try so many files of one of `KINDS`; yield what became of each batch.
-
-    A file depends on its kind, its number and the seed only.
-    """
+    """Try so many files of one of `KINDS`; yield what became of each batch."""
+    # A file depends on its kind, its number and the seed only.
     with worker_pool(jobs) as pool:
         batches: dict[Future[Outcomes], range] = {}
         for first in range(0, cases, _BATCH):

@@ -87,10 +87,7 @@ def without_worth(rows: Sequence[dict[str, Seen]]) -> Criteria:
 
 
 def derived(criteria: Criteria, worths: Sequence[float]) -> Criteria:
-    """Criteria with the largest worth of which nothing is said of nearly all recordings.
-
-    ValueError if there are too few of them.
-    """
+    """Criteria with the largest worth of which nothing is said of nearly all recordings."""
     return replace(criteria, worth=_round(1.0 / conformal(1.0 / np.array(worths), SOUND)))
 
 

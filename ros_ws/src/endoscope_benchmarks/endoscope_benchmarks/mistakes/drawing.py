@@ -38,11 +38,9 @@ SCATTERED = (
 def draw_rig(
     rng: Generator, joints: Sequence[str], spread: float, strength: float, effects: int
 ) -> PlantDescription:
-    """A rig of the family of tubes with other numbers and some effects of the catalogue.
-
-    Numbers are scattered by `spread` (rms of the logarithm). Each effect's parameters lie between
-    their typical value, at a `strength` of 0, and their bound, at 1.
-    """
+    """A rig of the family of tubes with other numbers and some effects of the catalogue."""
+    # Numbers are scattered by `spread` (rms of the logarithm). Each effect's parameters lie between
+    # their typical value, at a `strength` of 0, and their bound, at 1.
     drawn = {}
     for joint in joints:
         tube = shipped_family().joint(rng.uniform(0.0, MOST_BENT))

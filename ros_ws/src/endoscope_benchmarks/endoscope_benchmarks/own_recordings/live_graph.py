@@ -1,6 +1,5 @@
 """The whole graph in this process, an operator at its topics, and a hand at its handle."""
 
-import os
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any
 from rclpy.context import Context
 from rclpy.task import Future
 
+from endoscope_benchmarks.private_domain import process_domain
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.exit_status import ClosedOnExit
 from endoscope_core.rig import Rig
@@ -56,7 +56,7 @@ class LiveGraph(ClosedOnExit):
         arguments = ['--ros-args', '--log-level', 'fatal']
         arguments += ['-p', f'use_sim_time:={str(lock_step).lower()}']
         arguments += ['-p', f'tick_rate:={rate or RATE[lock_step]}']
-        domain = 100 + os.getpid() % 130 if domain is None else domain
+        domain = process_domain() if domain is None else domain
         self._runtime = Runtime(arguments, Context(), domain, given, rig=rig)
         try:
             for factory in (*SLAVE_NODES, *CONTROL_NODES):
@@ -100,10 +100,7 @@ class LiveGraph(ClosedOnExit):
     def hold_handle(
         self, angles: Callable[[float], Sequence[float]], rate: float, seconds: float
     ) -> None:
-        """Let the slave follow a handle that sends at a `rate` in Hz, its clutch held so long.
-
-        The angles (J,) in rad are those of so many s after the clutch was engaged.
-        """
+        """Follow a handle at a rate in Hz: angles (J,) in rad by the s since its clutch closed."""
         self.set('console', source='master')
         hand = HandleSender(self.node)
         try:

@@ -48,10 +48,8 @@ def by_empirical_risk(problem: Problem) -> Statement | None:
 
 
 def not_rejected(losses: Mapping[str, tuple[Array, Array]]) -> list[str]:
-    """Models that no other one beats in 95 % of repetitions, that of least risk first.
-
-    Losses are on what was measured, and on what the model generates itself.
-    """
+    """Models that no other one beats in 95 % of repetitions, that of least risk first."""
+    # Losses are on what was measured, and on what the model generates itself.
     from emdcmp import emd
 
     # emdcmp draws from a generator that nobody can seed.

@@ -47,11 +47,9 @@ def by_lisdd(problem: Problem) -> Reply:
 def localised(
     residuals: Array, slopes: Array, prior: Array, window: NDArray[np.int_]
 ) -> tuple[Array, Mask]:
-    """Residuals (M, S) of a model refitted to the clean regime alone, over their noise there.
-
-    `slopes` (M, S, n) are of the model's predictions, `prior` (n, n) weighs its numbers' steps,
-    `window` (M,) says to which each sample belongs. Also returns which windows are flagged.
-    """
+    """Residuals (M, S) over noise of a refit to the clean regime, and which windows stand out."""
+    # `slopes` (M, S, n) are of the model's predictions, `prior` (n, n) weighs its numbers' steps,
+    # `window` (M,) says to which each sample belongs.
     # Least trimmed squares by concentration steps (Rousseeuw, Van Driessen, Data Min. Knowl.
     # Discov. 12, 2006), on windows.
     count = np.maximum(np.bincount(window), 1)

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from endoscope_benchmarks.concealed.case import Case
-from endoscope_benchmarks.concealed.judge import Statement
+from endoscope_benchmarks.concealed.judge import Case, Statement
 from endoscope_core.physics import layout
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
@@ -125,10 +124,7 @@ def is_held_out(time: Array) -> Mask:
 
 
 def predicts(time: Array, before: Array, after: Array) -> bool:
-    """Whether a model leaves less of held-out blocks: a t-test of the logarithm of their ratio.
-
-    `before` and `after` (K,) are squares of held-out samples at `time` (K,) without and with it.
-    """
+    """Whether squares of held-out samples (K,) are less with a model: a t-test of log ratios."""
     # One rule for all peers, since few have one of their own by which they say nothing.
     block = (time // BLOCK_S).astype(int)
     means = [(np.mean(before[block == b]), np.mean(after[block == b])) for b in np.unique(block)]

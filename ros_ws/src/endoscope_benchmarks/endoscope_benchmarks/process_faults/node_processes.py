@@ -30,10 +30,7 @@ _FORK = multiprocessing.get_context('forkserver')
 
 
 class NodeProcesses(ClosedOnExit):
-    """Processes of nodes, by name; ``graph`` is that of all nodes composed.
-
-    What each process says goes to ``NAME.log`` in the folder.
-    """
+    """Processes of nodes by name, ``graph`` for all composed; each logs to ``NAME.log``."""
 
     def __init__(self, domain: int, folder: Path) -> None:
         self._domain = domain

@@ -45,7 +45,7 @@ class Operator(ClosedOnExit):
     `clutch`: whether the hand holds it.
     `shafts`, `goals`: what `motor/measured_js` and `motor/servo_jp` said.
     `sent`: commands sent to `slave/servo_jp`: session, stamp in ns, positions and velocities.
-    `replays`: whether each command is followed by an old one, sent anew.
+    `replays`: whether each command is followed by an old one, sent again.
     `late_ns`: how far stamps are behind.
     `graph`: what the graph says, and by which it is asked.
     """

@@ -90,10 +90,7 @@ class Outcome:
 
 
 def undergo(fault: ProcessFault, rig: ProcessRig) -> Outcome:
-    """Make a fault happen at a random instant of the motion, and look at what follows.
-
-    Raises RuntimeError: the graph does not move, or not long enough.
-    """
+    """Make a fault happen at a random instant of the motion, and look at what follows."""
     operator = rig.operator
     if fault.kills == 'recorder' and 'recorder' in rig.processes.running:
         # A bag of its own, for what is complete is found by reading it.

@@ -1,10 +1,10 @@
 """The running graph as processes with an operator: enabled, moved, broken, enabled again."""
 
-import os
 import time
 from pathlib import Path
 from random import Random
 
+from endoscope_benchmarks.private_domain import private_domain
 from endoscope_benchmarks.process_faults.node_processes import GRAPH, NODES, NodeProcesses
 from endoscope_benchmarks.process_faults.operator import Operator
 from endoscope_core.exit_status import ClosedOnExit
@@ -32,7 +32,7 @@ class ProcessRig(ClosedOnExit):
         self._folder = folder
         self._bags = 0
         self._console = 'master'
-        domain = 100 + (os.getpid() + rate + composed) % 130
+        domain = private_domain()
         self.processes = NodeProcesses(domain, folder)
         self.operator = Operator(domain)
         self.begin('master')
@@ -52,10 +52,7 @@ class ProcessRig(ClosedOnExit):
             self.operator.let_go_and_press()
 
     def revive(self) -> None:
-        """Start what does not run, and wait until every node is heard.
-
-        Raises RuntimeError: one is not.
-        """
+        """Start what does not run, and wait until every node is heard."""
         for name in self.names:
             if name not in self.processes.running:
                 self.start(name)
@@ -88,7 +85,7 @@ class ProcessRig(ClosedOnExit):
         self._forget(name)
 
     def kill_all(self) -> None:
-        """Have the next :meth:`begin` start everything anew."""
+        """Have the next :meth:`begin` start everything again."""
         for name in self.processes.running:
             self.kill(name)
 

@@ -72,13 +72,11 @@ class ShaftTrace:
         return float((way / took).max())
 
     def standstill(self, since_ns: int, open_ns: int, until_ns: int) -> tuple[float | None, float]:
-        """When the shafts came to rest, and how far they went without anybody's enable.
-
-        The stamps are those of the fault, of the last word that a session was open, and of the next
-        enable. Rest comes, in s from the fault, at the first reading from which on the shafts
-        stayed for 0.3 s, or never (None). The way, in rad, is the largest until the enable once
-        they had come to rest and no session had been open for `HELD_S`.
-        """
+        """When in s the shafts came to rest (None: never), and how far in rad they went unasked."""
+        # The stamps are those of the fault, of the last word that a session was open, and of the
+        # next enable. Rest begins with the first reading from which on the shafts stayed for 0.3 s.
+        # The way is the largest until the enable once they had come to rest and no session had been
+        # open for `HELD_S`.
         inside = (self._stamps >= since_ns) & (self._stamps < until_ns)
         stamps, angles = self._stamps[inside], self._angles[inside]
         ends = np.searchsorted(stamps, stamps + _WINDOW_NS)

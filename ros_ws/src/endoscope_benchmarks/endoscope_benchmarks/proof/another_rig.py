@@ -3,7 +3,7 @@
 Explaining a recording of the kernel's own laws is an inverse crime (Colton, Kress, Inverse Acoustic
 and Electromagnetic Scattering Theory, 1992): it shows that the search finds what it holds. Here the
 wires are rows of springs, the numbers of the rig are read by the same names, and every law is
-written anew in a form of its own.
+written again in a form of its own.
 """
 
 import math
@@ -160,10 +160,8 @@ FORMS: dict[str, Form] = {
 def drawn_laws(
     generator: Generator, name: str, duration: float, reached: float
 ) -> Callable[[float], Laws]:
-    """Draw everything about a law but its strength: at zero there is none, at one its `begin`.
-
-    The recording's duration is in s, the largest angle reached by its tip in rad.
-    """
+    """Draw all about a law but its strength, for a duration in s and a largest angle in rad."""
+    # At a strength of zero there is none, at one it is its `begin`.
     form = FORMS[name]
     chosen: dict[str, Any] = {}
     for key, ends in form.ranges.items():

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_benchmarks.concealed import motions
-from endoscope_benchmarks.concealed.case import Case, Law, law_of_effect
-from endoscope_benchmarks.concealed.formulas import DRAWN
+from endoscope_benchmarks.concealed.forms import DRAWN
+from endoscope_benchmarks.concealed.judge import Case, Law, law_of_effect
 from endoscope_benchmarks.concealed.readings import Readings, as_sensed
 from endoscope_benchmarks.concealed.rigs import described_rig, true_rig
 from endoscope_benchmarks.concealed.strata import AIM, as_strong, drawn_case
@@ -111,7 +111,7 @@ def _other(generator: Generator, effect: str | None) -> tuple[Case, dict]:
 def _as_strong(
     generator: Generator, effect: str, joint: JointParameters, command: Array
 ) -> tuple[Laws, float]:
-    """A law that moves a drawn share of the signal, drawn anew where it cannot."""
+    """A law that moves a drawn share of the signal, drawn again where it cannot."""
     bare = read(joint, Laws(), command, FEW_NODES)
     reached, duration = float(np.abs(bare.bending).max()), float(bare.time[-1])
 

@@ -35,10 +35,7 @@ class Proof:
 
 
 def prove(proof: Proof, folder: Path, say: Say) -> list[Outcome]:
-    """Record rigs into a folder, explain them, and compare what is said with what was sealed.
-
-    EndoscopeError if nothing can be written, or a seal was broken.
-    """
+    """Record rigs into a folder, explain them, and compare what is said with what was sealed."""
     with worker_pool(min(proof.jobs, proof.count)) as pool:
         rigs = _recorded(proof, folder, pool, say)
         answers = _explained(proof, rigs, pool, say)

@@ -45,10 +45,7 @@ class Tracking:
 
 
 def record(plant: PlantDescription, motion: str, bag: Path, seed: int) -> None:
-    """Record a motion of the console, played on the slave that a plant describes.
-
-    EndoscopeError if the graph refuses the motion, or a fault ended it.
-    """
+    """Record a motion of the console, played on the slave that a plant describes."""
 
     def play(graph: LiveGraph) -> None:
         graph.set('console', source='motion', motion=motion, joints=list(JOINTS))

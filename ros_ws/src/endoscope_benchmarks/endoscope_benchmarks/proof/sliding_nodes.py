@@ -70,12 +70,8 @@ class Acting:
 def simulate(
     plant: Plant, shaft_command: ArrayLike, tick: float, cells: int
 ) -> tuple[Array, Array, Array, Array]:
-    """Shaft (N,) in rad, tensions at motor and joint (N, 2) in N and bending angle (N,) in rad.
-
-    The plant has the keys of `NOMINAL`, in SI units, and each wire so many cells (nodes). Tensions
-    are those of wires a and b. Each commanded shaft angle (N,) in rad is held for one tick in s.
-    Row k is the state before command k acts.
-    """
+    """Shaft (N,) in rad, tensions at motor and joint (N, 2) in N and bending angle (N,) in rad."""
+    # Row k is the state before command k acts, which is held for one tick in s.
     shaft = motor_angle(plant, shaft_command, tick)
     return shaft, *follow(plant, shaft, tick, cells)
 
@@ -138,10 +134,7 @@ def follow(
 
 
 def move_wire(plant: Plant, motor: ArrayLike, joint: ArrayLike, cells: int) -> Array:
-    """Tension in N along one wire, (N, cells + 1), for given displacements in m of its ends (N,).
-
-    Displacements are towards the motor; at the first ones the wire is as it was tightened.
-    """
+    """Tension (N, cells + 1) in N along a wire whose ends are displaced (N,) in m to the motor."""
     grip, springs, tension = _wire(plant, cells)
     motor, joint = np.asarray(motor, dtype=float), np.asarray(joint, dtype=float)
     along = np.empty((len(motor), cells + 1))

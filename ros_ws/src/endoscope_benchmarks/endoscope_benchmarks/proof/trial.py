@@ -1,5 +1,8 @@
-"""One rig of the proof: recorded and sealed, explained, and opened."""
+"""Recordings in memory as bags with the signals of the graph."""
 
+import hashlib
+import json
+import secrets
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -7,19 +10,94 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_benchmarks.concealed.case import Law
-from endoscope_benchmarks.concealed.judge import Judgement, judged, statements
+from endoscope_bags import BagWriter, MessageStream
+from endoscope_bags.cdr_encoding import encode_joint_states
+from endoscope_bags.message_types import JOINT_STATE
+from endoscope_bags.recording import rig_record
+from endoscope_benchmarks.concealed.judge import Judgement, Law, judged, statements
 from endoscope_benchmarks.proof import SLAVE, slave
-from endoscope_benchmarks.proof.bag_of_rig import write_bag
 from endoscope_benchmarks.proof.drawing import drawn
-from endoscope_benchmarks.proof.seal import opened, seal
+from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import load_plant
 from endoscope_core.physics.plant_file import plant_from_mapping, save_plant
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.observe.predicted_signals import view
 from endoscope_explain.pipeline import Sources, explain_case, read_inputs
+from endoscope_explain.recording import (
+    BENDING,
+    COMMAND,
+    MOTOR,
+    WIRES,
+    Recording,
+    Series,
+    motor_name,
+    wire_names,
+)
 from endoscope_explain.report.sentences import verdict_sentence
 from endoscope_explain.report.writing import PLANT_YAML, REPORT_HTML, provenance, write_report
+
+BEGIN_NS = 1_000_000_000
+"""First stamp: a simulation's clock that has run for a second."""
+
+
+def write_bag(recording: Recording, out: Path) -> None:
+    """Write commands, motors, wires and tip at their stamps; BagError if it exists or cannot be."""
+    motors = [motor_name(joint) for joint in recording.joints]
+    wires = [wire for joint in recording.joints for wire in wire_names(joint)]
+    sensors = recording.measured()
+
+    def stream(topic: str, names: list[str], **series: Series) -> MessageStream:
+        stamps = BEGIN_NS + np.rint(1e9 * next(iter(series.values())).time).astype(np.int64)
+        values = {key: s.values.reshape(len(stamps), -1) for key, s in series.items()}
+        payloads = encode_joint_states(
+            names,
+            stamps,
+            position=values.get('position'),
+            velocity=values.get('velocity'),
+            effort=values.get('effort'),
+        )
+        return MessageStream(f'/{topic}', JOINT_STATE, payloads, stamps, stamps)
+
+    shaft = {
+        key: sensors[f'shaft_{key}']
+        for key in ('position', 'velocity', 'effort')
+        if f'shaft_{key}' in sensors
+    }
+    with BagWriter(out, records=rig_record(recording.rig)) as writer:
+        writer.write_streams(
+            [
+                stream(COMMAND, motors, position=recording.command),
+                stream(MOTOR, motors, **shaft),
+                stream(WIRES, wires, effort=sensors['tension']),
+                stream(BENDING, list(recording.joints), position=sensors['bending']),
+            ]
+        )
+
+
+class BrokenSealError(EndoscopeError, ValueError):
+    """A truth is not what was sealed."""
+
+
+def seal(path: Path, truth: dict) -> str:
+    """Write a truth as JSON and return the SHA-256 of the file, in hex."""
+    # Without a number of its own a truth of few words could be guessed from its digest.
+    content = json.dumps(truth | {'salt': secrets.token_hex(16)}, indent=1, default=str)
+    path.write_text(content + '\n', encoding='utf-8')
+    return digest(path)
+
+
+def opened(path: Path, told: str) -> dict:
+    """Read a truth whose digest was told before; BrokenSealError if the file is another one now."""
+    if digest(path) != told:
+        raise BrokenSealError(f'{path}: its SHA-256 is not the one that was told: it was changed')
+    truth: dict = json.loads(path.read_text(encoding='utf-8'))
+    return truth
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of a file, in hex, as `sha256sum` prints it."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
 
 Array = NDArray[np.float64]
 

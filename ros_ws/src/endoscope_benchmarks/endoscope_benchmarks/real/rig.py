@@ -45,7 +45,7 @@ OF_TUBE = (
     'friction_profile_3',
     'joint_rest_angle',
 )
-"""What another shape of the tube changes, tightened anew."""
+"""What another shape of the tube changes, tightened again."""
 STANDS, STEPS = 1e-5, 60
 """Share of the cost, and steps, after which a fit of one recording ends."""
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from endoscope_benchmarks.bench import table_head, table_row
 from endoscope_benchmarks.real.explained import Number, Tell
 from endoscope_benchmarks.real.rig import Plant, Told, as_described, wide
 from endoscope_benchmarks.real.takes import TUBES, read
@@ -89,12 +90,12 @@ def as_table(rows: list[TakenOut]) -> str:
     columns = ('tube', 'taken out', 'nats lost', 'named', 'its number', 'of the whole plant')
     cycles = ('without it', 'with what was named', 'whole')
     head = (*columns, *(f'second cycle {each}' for each in cycles))
-    lines = ['| ' + ' | '.join(head) + ' |', '|' + '---|' * len(head)]
+    lines = [table_head(*head)]
     for row in rows:
         number = '-' if row.number is None else _shown(row.number)
         left = [_left(row, name) for name in row.told.plants]
         cells = [row.tube, row.piece, f'{row.lost:.0f}', ', '.join(row.named) or 'nothing']
-        lines.append('| ' + ' | '.join([*cells, number, _shown(row.whole), *left]) + ' |')
+        lines.append(table_row(*cells, number, _shown(row.whole), *left))
     first = [row for row in rows if row.is_first]
     agree = sum(row.agrees for row in first)
     better = sum(row.is_better for row in first)

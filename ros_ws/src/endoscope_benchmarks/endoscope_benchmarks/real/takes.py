@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 JOINT = 'bend_x'
 TUBES = ('0', '60', '120', '180', '240')
 STATE, OTHERS, TIGHTENED = 'conf0_60', ('conf0_50', 'conf0_70'), 'conf0_60_'
-"""Another state of the rig; of other amplitudes; tightened anew."""
+"""Another state of the rig; of other amplitudes; tightened again."""
 UNKNOWN_TUBES = ('odd_test', 'scnn_test', 'output', 'ff', 'aurora_ff')
 NAMES = (*TUBES, STATE, *OTHERS, TIGHTENED, *UNKNOWN_TUBES)
 KGF = 9.80665
@@ -147,10 +147,7 @@ def _noise(values: Array) -> float:
 
 
 def between_cycles(take: Take) -> tuple[float, ...]:
-    """Rms by which cycles differ from the first reversal on: angle in rad, then tensions in N.
-
-    It is nan where the command does not repeat itself.
-    """
+    """Rms between cycles: angle in rad, then tensions in N; nan if the command does not repeat."""
     first = take.command[take.time < take.cycle_s]
     moving = float(take.time[np.flatnonzero(np.diff(take.command))[-1]])
     begin, end = float(take.time[np.argmax(np.abs(first))]), moving - take.cycle_s

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_benchmarks.trials.classifier_trial import random_tube
-from endoscope_benchmarks.trials.unusual_recordings import UNUSUAL
+from endoscope_benchmarks.trials.unseen_tubes import UNUSUAL, random_tube
 from endoscope_core.calibration import TensionGapError, TensionRecord
 from endoscope_core.classifier.classification import (
     ClassificationResult,
@@ -79,12 +78,10 @@ def judged_at_rate(
     gap: float = 0.0,
     delay: float = 0.0,
 ) -> RateTrial:
-    """Read, resample and judge one calibration at a rate of readings a second.
-
-    Each comes up to `JITTER` of the interval early or late, and is older than its stamp by `delay`
-    s. There are none for `gap` s where the tension bends most; however long, that is bridged. The
-    seed is that of phase, jitter and noise.
-    """
+    """Read, resample and judge one calibration at a rate of readings a second."""
+    # Each comes up to `JITTER` of the interval early or late, and is older than its stamp by
+    # `delay` s. There are none for `gap` s where the tension bends most; however long, that is
+    # bridged. The seed is that of phase, jitter and noise.
     generator = np.random.default_rng([_UNSEEN, seed, round(rate)])
     motion = calibration_motion(classifier.motion)
     stamps = _stamps(generator, rate, motion)

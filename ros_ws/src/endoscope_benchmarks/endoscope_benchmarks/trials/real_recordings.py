@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from endoscope_benchmarks.trials.tension_loop import tension_loop_width
 from endoscope_core.errors import InputError
 from endoscope_core.hysteresis.inverse import HysteresisParameters
 from endoscope_core.identification import ModelFit, Recording, TableEntry, UpdatedTable, fit_model
@@ -98,17 +97,10 @@ def without_repeats(table: Array) -> Array:
 
 
 def closed_cycle(driver: Array, actual: Array) -> Recording:
-    """One period from rest, as it would go on for ever.
-
-    A model fitted to the first period alone may drift in the second, for nothing in the first says
-    that loops close. Here the period is followed by itself, and the part before the first turning
-    point, which belongs to the way from rest, counts only the first time.
-
-    Parameters
-    ----------
-    driver, actual : ndarray, shape (N,)
-        Joint-equivalent motor angle and bending angle in rad, from rest, over one whole period.
-    """
+    """One whole period of angles (N,) in rad from rest, as it would go on for ever."""
+    # A model fitted to the first period alone may drift in the second, for nothing in the first
+    # says that loops close. Here the period is followed by itself, and the part before the first
+    # turning point, which belongs to the way from rest, counts only the first time.
     turn = int(np.argmax(np.abs(driver[: len(driver) // 2])))
     scored = np.ones(2 * len(driver), dtype=np.bool_)
     scored[len(driver) : len(driver) + turn] = False
@@ -192,5 +184,28 @@ def left_one_out(recordings: Sequence[RealRecording], model: str, seed: int) -> 
 
 def _hysteresis(parameters: object) -> HysteresisParameters:
     if not isinstance(parameters, HysteresisParameters):
-        raise InputError(f'{type(parameters).__name__} is no hysteresis model')
+        raise InputError(f'{type(parameters).__name__} is not a hysteresis model')
     return parameters
+
+
+def tension_loop_width(
+    desired: ArrayLike, tension_positive: ArrayLike, tension_negative: ArrayLike
+) -> float:
+    """Width, in the unit of the angle (N,), of the loop of both wires' tension difference in N."""
+    # The difference of the tensions is the load of the joint's drive, and leads the desired angle:
+    # at a reversal friction turns round at the motor first. On real recordings its width falls
+    # along a straight line with the backlash size; on the simulated rig it falls from a capstan
+    # exponent of 0.7 on, and hardly changes below.
+    difference = np.asarray(tension_negative, dtype=float) - np.asarray(tension_positive)
+    return width_at_mid_height(desired, difference)
+
+
+def leave_one_out_errors(feature: ArrayLike, target: ArrayLike) -> NDArray[np.float64]:
+    """Errors (R,) of a straight line through all other points, at each of R >= 3 points."""
+    x, y = np.asarray(feature, dtype=float), np.asarray(target, dtype=float)
+    errors = np.empty_like(y)
+    for k in range(len(y)):
+        others = np.arange(len(y)) != k
+        slope, intercept = np.polyfit(x[others], y[others], 1)
+        errors[k] = slope * x[k] + intercept - y[k]
+    return errors

@@ -4,8 +4,12 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from endoscope_benchmarks.trials.never_seen_tube import backlash_left, calibrate, never_seen_tube
-from endoscope_benchmarks.trials.tracking_trial import run_tracking_trial
+from endoscope_benchmarks.trials.tracking_trial import (
+    backlash_left,
+    calibrate,
+    never_seen_tube,
+    run_tracking_trial,
+)
 from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_core.control import FeedforwardLaw
 from endoscope_core.identification.law_choice import LawChoice
@@ -22,10 +26,8 @@ _BEGIN = 3.0
 
 
 def tracking_plot(seed: int) -> str:
-    """An SVG element: three loops of 60 sin t, the motion and the errors around its reversals.
-
-    The backlash is the 94 deg of the paper's descending colon; rig, tube and noise are the seed's.
-    """
+    """An SVG element: three loops of 60 sin t, the motion and the errors around its reversals."""
+    # The backlash is that of the paper's descending colon; rig, tube and noise are the seed's.
     tube = never_seen_tube(seed, 0, _SIZE_DEG)
     findings = calibrate(tube, load_classifier())
     choice, signal = LawChoice(2), periodic_signal()
