@@ -75,9 +75,9 @@ def test_what_cannot_be_served_encrypted_is_not_served(tmp_path, capsys):
         (['--host', '0.0.0.0'], 'give the one address'),
         (['--certificate', certificate], 'belong together'),
         (['--certificate', certificate, '--key', tmp_path / 'no.key'], 'no such file'),
-        (['--certificate', certificate, '--key', anothers], 'are no certificate'),
+        (['--certificate', certificate, '--key', anothers], 'are not a PEM certificate'),
         (['--certificate', certificate, '--key', locked], 'without a password'),
-        (['--certificate', key, '--key', certificate], 'are no certificate'),
+        (['--certificate', key, '--key', certificate], 'are not a PEM certificate'),
     ):
         command = ['console', '--no-graph', '--port', '0', *map(str, words)]
         assert main(command) == 2, words

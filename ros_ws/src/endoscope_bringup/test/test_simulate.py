@@ -143,7 +143,7 @@ def test_what_is_no_seed_is_refused(recorded, plant_file, tmp_path, capsys, seed
     with pytest.raises(SystemExit) as refusal:
         run(plant_file, recorded, tmp_path / 'answer', '--noise', seed)
     assert refusal.value.code == 2
-    assert f"'{seed}' is no seed" in capsys.readouterr().err
+    assert f"'{seed}' is not a seed" in capsys.readouterr().err
     assert not (tmp_path / 'answer').exists()
 
 
