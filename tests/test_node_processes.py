@@ -33,8 +33,8 @@ RIG = 'timeouts: {command: 1.0, stream: 10.0, handle: 1.0}'
 """Time-outs that a busy machine can keep."""
 
 
-def start(module, *args):
-    code = f'import sys; from endoscope_nodes.{module} import main; sys.exit(main())'
+def start(program, *args):
+    code = f'import sys; from endoscope_nodes.program import {program}; sys.exit({program}())'
     return subprocess.Popen(
         [sys.executable, '-c', code, '--ros-args', *args],
         stdout=subprocess.PIPE,
@@ -106,8 +106,7 @@ def rig(tmp_path):
 
 def test_each_node_is_a_process_and_stops_cleanly(operator, rig):
     processes = {
-        node: start(f'nodes.{node}', *rig, *(['-p', 'source:=motion'] * (node == 'console')))
-        for node in NODES
+        node: start(node, *rig, *(['-p', 'source:=motion'] * (node == 'console'))) for node in NODES
     }
     try:
         operator.wait_until(lambda: operator.heard >= set(NODES))
@@ -153,9 +152,8 @@ def test_the_whole_graph_in_motion_stops_cleanly(operator, rig, tmp_path, number
     ],
 )
 def test_wrong_parameters_are_one_line_and_exit_code_2(tmp_path, node, override, words):
-    module = node if node == 'graph' else f'nodes.{node}'
     extra = ['-p', f'bag:={tmp_path / "bag"}'] if node == 'graph' else []
-    process = start(module, '-p', override, *extra)
+    process = start(node, '-p', override, *extra)
     _, errors = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 2
     assert words in errors
