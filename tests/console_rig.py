@@ -9,6 +9,7 @@ import time
 from contextlib import ExitStack
 
 from console_page import Page
+from node_program import code_of
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState, Joy
 
@@ -22,7 +23,6 @@ from endoscope_nodes.topics import Qos
 
 CONSOLE = [sys.executable, '-m', 'endoscope_bringup.cli', 'console']
 OF_THE_GRAPH = ['--ros-args', '-p', 'source:=master', '-p', 'tick_rate:=250']
-_GRAPH = 'import sys; from endoscope_nodes.program import graph; sys.exit(graph())'
 PATIENCE_S = 240.0
 _QUEUE = profile(Qos(2000, reliable=False))
 
@@ -99,7 +99,7 @@ class ConsoleRig:
         self._stack = ExitStack()
         self.goals, self.wanted, self.clutches = [], [], []
         self._graph = subprocess.Popen(
-            [sys.executable, '-c', _GRAPH, *OF_THE_GRAPH],
+            [sys.executable, '-c', code_of('graph'), *OF_THE_GRAPH],
             cwd=folder,
             env=self.environment,
             stdin=subprocess.DEVNULL,

@@ -8,6 +8,7 @@ import time
 
 import pytest
 from commanded_graph import Handle
+from node_program import code_of
 from rclpy.context import Context
 from rclpy.node import Node
 from simulated_graph import SimulatedGraph
@@ -22,7 +23,6 @@ from endoscope_nodes.names import FACTOR
 from endoscope_nodes.runtime.runtime import Runtime
 
 PATIENCE_S = 240.0
-_GRAPH = 'import sys; from endoscope_nodes.program import graph; sys.exit(graph())'
 _SECTION = '/**/load_cells: {ros__parameters: {device: modbus_tcp}}\n'
 
 
@@ -32,7 +32,7 @@ def running(tmp_path_factory):
     domain = private_domain()
     process = subprocess.Popen(
         [
-            *(sys.executable, '-c', _GRAPH),
+            *(sys.executable, '-c', code_of('graph')),
             *('--ros-args', '-p', 'tick_rate:=200', '-p', 'autostart:=false'),
         ],
         cwd=tmp_path_factory.mktemp('graph'),

@@ -9,6 +9,7 @@ import time
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from node_program import code_of
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import JointState
@@ -34,9 +35,8 @@ RIG = 'timeouts: {command: 1.0, stream: 10.0, handle: 1.0}'
 
 
 def start(program, *args):
-    code = f'import sys; from endoscope_nodes.program import {program}; sys.exit({program}())'
     return subprocess.Popen(
-        [sys.executable, '-c', code, '--ros-args', *args],
+        [sys.executable, '-c', code_of(program), '--ros-args', *args],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+from node_program import code_of
 
 from endoscope_benchmarks.private_domain import private_domain
 from endoscope_core.atomic_output import atomic_directory
@@ -31,9 +32,8 @@ WORDS = {
 def start(name, *args, on_hangup=signal.SIG_DFL, environment=None, **options):
     # The tests themselves may have been started by `nohup`.
     hangup = f'import signal; signal.signal(signal.SIGHUP, signal.{on_hangup.name})'
-    code = f'import sys; from endoscope_nodes.program import {name}; sys.exit({name}())'
     return subprocess.Popen(
-        [sys.executable, '-c', f'{hangup}; {code}', *args],
+        [sys.executable, '-c', f'{hangup}; {code_of(name)}', *args],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -121,13 +121,12 @@ def _effects(found: Fit) -> tuple[Term, ...]:
 def _trial_fits(choice: SharedChoice, jobs: int) -> dict[Variant, list[TrialFit | None]]:
     """The best cheap fit of each promising variant of an effect, for each recording."""
     trials: dict[Variant, list[TrialFit | None]] = {}
-    everywhere = set.intersection(
-        *({t.id for t in _effects(references[0])} for references in choice.recordings)
-    )
-    for n, references in enumerate(choice.recordings):
+    by_recording = [_effects(references[0]) for references in choice.recordings]
+    everywhere = set.intersection(*({t.id for t in terms} for terms in by_recording))
+    for n, (references, own_terms) in enumerate(zip(choice.recordings, by_recording, strict=True)):
         behind = background(references[0])
         offset = behind.offset
-        terms = tuple(t for t in _effects(references[0]) if t.id in everywhere)
+        terms = tuple(t for t in own_terms if t.id in everywhere)
         variants = by_variant(screened(behind, directions(behind, terms, jobs)))
         tasks = [term for own in variants[:TRIED] for term in own[:STARTS]]
 

@@ -13,9 +13,9 @@ import tty
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
+from endoscope_core.exit_status import ClosedOnExit
 from endoscope_devices.dynamixel import control_table as table
 from endoscope_devices.dynamixel.control_table import BAUD_CODES, RETURN_DELAY_UNIT
 from endoscope_devices.dynamixel.packet import (
@@ -40,7 +40,7 @@ _SLACK_NS = 1000
 _IDLE_S = 5e-3
 
 
-class EmulatedBus:
+class EmulatedBus(ClosedOnExit):
     """A line with servos, served by a thread.
 
     Bytes take the time that the line's speed says, both ways; a servo that is set to another speed
@@ -74,7 +74,7 @@ class EmulatedBus:
         """Begin to serve."""
         self._thread.start()
 
-    def stop(self) -> None:
+    def close(self) -> None:
         """End, and take the terminal away."""
         self._stopping = True
         os.write(self._wake_write, b'x')
@@ -86,14 +86,6 @@ class EmulatedBus:
     def __enter__(self) -> Self:
         self.start()
         return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.stop()
 
     @contextmanager
     def paused(self) -> Iterator[LineFaults]:
