@@ -154,7 +154,7 @@ class ChainCut:
         return self.by_motor < 0.5 * self.by_command
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ExplainedCase:
     """All that is known about one recording."""
 

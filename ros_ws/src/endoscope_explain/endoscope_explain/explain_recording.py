@@ -75,29 +75,30 @@ def explain_recording(
     def explained(pair: ReferenceFits) -> Explained:
         if given is not None:
             return explained_by(pair, given[pair[0].model.observation.joint], jobs)
-        tried = search(pair, jobs, most_effects, left_out)
+        tried = search([pair], jobs, most_effects, left_out)
         return tried, decide(tried, jobs)
 
     searches, decisions = _explained_together(references, explained, tell)
     tell('judging on held-out blocks')
     effects = named(observations, decisions)
+    of_joint = {o.joint: d for o, d in zip(observations, decisions, strict=True)}
     return Explanation(
-        verdict_of(effects, decisions),
-        effects,
-        {
-            o.joint: nominal_estimates(d.chosen.fit, packed_joint(plant, o.joint)[0], NOMINAL_UNITS)
-            for o, d in zip(observations, decisions, strict=True)
+        verdict=verdict_of(effects, decisions),
+        effects=effects,
+        parameters={
+            joint: nominal_estimates(d.chosen.fit, packed_joint(plant, joint)[0], NOMINAL_UNITS)
+            for joint, d in of_joint.items()
         },
-        plant,
-        plant_of(well, [refitted(s, d) for s, d in zip(searches, decisions, strict=True)]),
-        plant_of(well, [d.chosen for d in decisions]),
-        ladder(references, searches, decisions),
-        candidates(observations, searches),
-        missing_function(decisions),
-        all(d.adequate for d in decisions),
-        max(d.beyond_form for d in decisions),
-        {o.joint: fitting(d.chosen.fit) for o, d in zip(observations, decisions, strict=True)},
-        {o.joint: d.instead for o, d in zip(observations, decisions, strict=True) if d.instead},
+        nominal=plant,
+        refitted=plant_of(well, list(map(refitted, searches, decisions))),
+        augmented=plant_of(well, [d.chosen for d in decisions]),
+        fit=ladder(references, searches, decisions),
+        candidates=candidates(observations, searches),
+        unknown=missing_function(decisions),
+        adequate=all(d.adequate for d in decisions),
+        beyond_form=max(d.beyond_form for d in decisions),
+        fitting={joint: fitting(d.chosen.fit) for joint, d in of_joint.items()},
+        instead={joint: d.instead for joint, d in of_joint.items() if d.instead},
     )
 
 
@@ -116,7 +117,7 @@ def _healthy(
     packed = {o.joint: packed_joint(plant, o.joint) for o in before}
 
     def described(references: tuple[Fit, Fit]) -> Candidate:
-        tried = search(references, jobs, 1, left_out)
+        tried = search([references], jobs, 1, left_out)
         found = [level.best for level in tried.levels if level.is_found]
         # What depends on time was the first recording's own.
         lasting = [c for c in found if not any(t.effect.traits.depends_on_time for t in c.terms)]

@@ -166,7 +166,7 @@ class UnknownTerm:
         return replace(term, values=tuple(self.values.tolist()))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Explanation:
     """Everything the engine says about one recording."""
 
@@ -193,4 +193,12 @@ class Explanation:
     @staticmethod
     def without_fit(verdict: Verdict, plant: PlantDescription) -> 'Explanation':
         """What is said where nothing may be fitted, or nothing can be."""
-        return Explanation(verdict, (), {}, plant, plant, plant, {})
+        return Explanation(
+            verdict=verdict,
+            effects=(),
+            parameters={},
+            nominal=plant,
+            refitted=plant,
+            augmented=plant,
+            fit={},
+        )

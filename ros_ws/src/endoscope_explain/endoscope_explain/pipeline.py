@@ -153,14 +153,14 @@ def explain_case(
         tell('locating what was found')
     recording = audit.recording
     case = ExplainedCase(
-        recording,
-        audit,
-        explanation,
-        combined_verdict(explanation, audit),
-        combined_effects(explanation, audit),
-        (),
-        with_unrecorded(plant, sources.plant),
-        {},
+        recording=recording,
+        audit=audit,
+        explanation=explanation,
+        verdict=combined_verdict(explanation, audit),
+        effects=combined_effects(explanation, audit),
+        places=(),
+        plant=with_unrecorded(plant, sources.plant),
+        ladder={},
         validation_name='' if validation is None else validation.name,
         baseline_name='' if inputs.baseline is None else inputs.baseline.name,
         said_of_others=inputs.said_of_others,

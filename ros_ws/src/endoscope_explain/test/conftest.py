@@ -97,13 +97,13 @@ def stribeck_case(stribeck_recording):
         for joint in plant.joints
     }
     explanation = Explanation(
-        Verdict.MISSING_PHYSICS,
-        (effect,),
-        parameters,
-        plant,
-        plant,
-        augmented,
-        {name: fits_by(recorded, name) for name in ('nominal', 'refitted', 'augmented')},
+        verdict=Verdict.MISSING_PHYSICS,
+        effects=(effect,),
+        parameters=parameters,
+        nominal=plant,
+        refitted=plant,
+        augmented=augmented,
+        fit={name: fits_by(recorded, name) for name in ('nominal', 'refitted', 'augmented')},
     )
     inputs = Inputs(Sources(Path('synthetic'), plant, quick=True), audit)
     return explain_case(inputs, lambda *_, **__: explanation)

@@ -6,7 +6,7 @@ from outside_data import CASES, needs
 
 from endoscope_core.physics import load_plant
 from endoscope_explain.fit.evidence import mean_squares
-from endoscope_explain.fit.free_parameters import BAND, FORM_INDICES
+from endoscope_explain.fit.free_parameters import BAND, SCATTERED
 from endoscope_explain.fit.nominal import with_references
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.recording import recording_from_bag
@@ -29,5 +29,5 @@ def test_the_plant_as_described_leaves_the_noise_and_its_refit_stays_there():
             found, true = item.value(float(coordinate)), item.value(float(truth))
             if item.name in ('pretension', 'wire_stiffness', 'capstan_exponent'):
                 assert found == pytest.approx(true, rel=0.02)
-            elif item.name in FORM_INDICES:
+            elif item.name in SCATTERED:
                 assert abs(found - true) < 0.5 * item.unit

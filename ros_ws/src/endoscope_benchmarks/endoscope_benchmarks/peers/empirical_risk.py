@@ -35,7 +35,7 @@ def by_empirical_risk(problem: Problem) -> Statement | None:
     fits = {'': problem.refitted}
     for name in list(ranked)[: -MODELS - 1 : -1]:
         seen = trial_fit((problem.refitted, problem.described), ranked[name], behind.offset)
-        fits[name] = refit(seen, nominal).fit
+        fits[name] = refit((seen,), nominal).fit
     draw = np.random.default_rng(1)
     chosen = draw.choice(len(problem.refitted.residuals), SAMPLES)
     ideal = 0.5 * draw.standard_normal((len(fits), SAMPLES)) ** 2

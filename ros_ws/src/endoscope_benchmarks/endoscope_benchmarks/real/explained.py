@@ -17,7 +17,6 @@ from endoscope_benchmarks.real.rig import (
     wide,
 )
 from endoscope_benchmarks.real.takes import (
-    JOINT,
     OTHERS,
     STATE,
     TIGHTENED,
@@ -34,7 +33,6 @@ from endoscope_explain.fit.model import Fit, JointModel, jacobian, without_effec
 from endoscope_explain.fit.pooled import deviations, fit_together
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.search.levels import search
-from endoscope_explain.shared_physics import SharedChoice, searched
 
 Array = NDArray[np.float64]
 Tell = Callable[[str], None]
@@ -72,18 +70,16 @@ def explained_tubes(folder: Path, jobs: int, tell: Tell) -> Tubes:
     for _ in range(ROUNDS - 1):
         fits = fit_together(models, [f.theta for f in fits])
     described = [_as_fit(m, s) for m, s in zip(models, starts, strict=True)]
-    nominal = SharedChoice(JOINT, (), tuple(zip(fits, described, strict=True)))
     said: list[str] = []
 
     def heard(text: str) -> None:
         said.append(text)
         tell(text)
 
-    chosen, refused = searched(nominal, MOST_EFFECTS, jobs, heard)
-    named = bool(chosen.effects) or refused is None
-    if not named and refused is not None:
-        chosen = refused
-    explained = [references[0] for references in chosen.recordings]
+    tried = search(list(zip(fits, described, strict=True)), jobs, MOST_EFFECTS, tell=heard)
+    named = bool(tried.found.effects) or not tried.levels
+    chosen = tried.found if named else tried.levels[-1].best
+    explained = chosen.fits
     told = []
     for take, model, start, before, after in zip(
         takes, models, starts, fits, explained, strict=True
@@ -160,7 +156,7 @@ def explained_state(folder: Path, tubes: Tubes, jobs: int, tell: Tell) -> State:
         told.append(Told(other, 0.0, plants))
     tell(f'{take.name}: what it would be given alone')
     cycle = Plant.of(before).on(take.until(take.cycle_s).observation()).refitted()
-    decision = decide(search((cycle,), jobs, MOST_EFFECTS), jobs)
+    decision = decide(search([(cycle,)], jobs, MOST_EFFECTS), jobs)
     alone = tuple(term.name for term in decision.missing)
     return State(tuple(told), after, needed, alone)
 

@@ -63,7 +63,7 @@ def taken_out(folder: Path, jobs: int, tell: Tell) -> list[TakenOut]:
         for piece in NOMINAL_PHYSICS.values():
             tell(f'tube {name} without {piece.id}')
             without = Plant(*without_effect(whole, piece.id)).refitted()
-            decision = decide(search((without,), jobs, 0), jobs)
+            decision = decide(search([(without,)], jobs, 0), jobs)
             found = decision.chosen.fit
             seen = take.observation()
             plants = {

@@ -30,7 +30,7 @@ class PlantNumber:
     """What is known of one key of a plant beside its nominal value, in SI units.
 
     A healthy rig's number is the described one but for a factor (`scaled`), or is off by `spread`
-    (rms), or is as it was drawn and machined.
+    (rms).
     """
 
     unit: str
@@ -46,6 +46,9 @@ class PlantNumber:
 
 
 _ROW = 'number'
+_MACHINED = 2.5e-5 / math.sqrt(3.0)
+"""Rms in m of a radius as machined: diameters to 6 mm without a tolerance of their own keep 0.05 mm
+(ISO 2768-1, class fine), and are taken to lie anywhere within it (GUM, 4.3.7)."""
 
 
 def _number(
@@ -95,11 +98,11 @@ class JointParameters:
     )
     pulley_radius: float = _number(
         0.0024, 'm', 'radius at which the wires are wound at the motor',
-        1e-4, 0.1, Stage.TRANSMISSION, keeper=Keeper.DEVICE,
+        1e-4, 0.1, Stage.TRANSMISSION, spread=_MACHINED, keeper=Keeper.DEVICE,
     )
     joint_radius: float = _number(
         0.0008, 'm', 'radius at which the wires act on the joint',
-        1e-4, 0.1, Stage.TRANSMISSION, keeper=Keeper.DEVICE,
+        1e-4, 0.1, Stage.TRANSMISSION, spread=_MACHINED, keeper=Keeper.DEVICE,
     )
     capstan_exponent: float = _number(
         0.9, '', 'friction times the bend of the whole sheath; what its shape changes',

@@ -246,10 +246,12 @@ def ladder(
     for (_, described), tried, decision in zip(references, searches, decisions, strict=True):
         observation = described.model.observation
         compared['nominal'] |= held_out_fit(observation, described.residuals)
-        before = held_out_fit(observation, refitted(tried, decision).unseen)
+        before = held_out_fit(observation, refitted(tried, decision).unseen[0])
         compared['refitted'] |= before
         compared['augmented'] |= (
-            held_out_fit(observation, decision.chosen.unseen) if decision.chosen.terms else before
+            held_out_fit(observation, decision.chosen.unseen[0])
+            if decision.chosen.terms
+            else before
         )
     return compared
 

@@ -92,15 +92,19 @@ def decide(search: JointSearch, jobs: int) -> Decision:
         if level.adds_nothing(best):
             chosen, instead = best, _instead(level)
             continue
-        best = replace(best, fit=with_form(best.fit, jobs))
+        best = _with_form(best, jobs)
         if any(not t.is_function and may_be_absent(best.fit, t.effect) for t in best.terms):
             break
         chosen, instead = best, ()
         if not best.terms[-1].multiplies:
             missing = (*missing[: len(best.terms) - 1], _missing(level, best, jobs))
     missing = _named_as_chosen(search, chosen, missing, jobs)
-    chosen = replace(chosen, fit=with_form(chosen.fit, jobs))
+    chosen = _with_form(chosen, jobs)
     return Decision(chosen, missing, share_explained(search.nominal, chosen), instead)
+
+
+def _with_form(one: Candidate, jobs: int) -> Candidate:
+    return replace(one, fits=(with_form(one.fit, jobs),))
 
 
 def share_explained(nominal: Candidate, chosen: Candidate) -> float:
@@ -134,7 +138,7 @@ def _missing(level: Level, best: Candidate, jobs: int) -> MissingTerm:
     alternatives = tuple(dict.fromkeys(near))
     best_other = max((level.gain(each) for each in others), default=0.0)
     if formula is not None and formula is not best:
-        formula = replace(formula, fit=with_form(formula.fit, jobs))
+        formula = _with_form(formula, jobs)
         if may_be_absent(formula.fit, formula.terms[-1].effect):
             # The function is there; the effect whose formula comes nearest may not be.
             name, formula = last.id, None

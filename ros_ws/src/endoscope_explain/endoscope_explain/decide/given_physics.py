@@ -61,7 +61,7 @@ def explained_by(
     beside = decide(JointSearch(candidate((), found), ()), jobs)
     tried: tuple[Level, ...] = ()
     if not beside.adequate:
-        tried = search((found,), jobs, 1).levels
+        tried = search([(found,)], jobs, 1).levels
         beside = decide(JointSearch(candidate((), found), tried), jobs)
     chosen = candidate((*terms, *beside.chosen.terms), beside.chosen.fit)
     everything = (*missing, *beside.missing)

@@ -23,15 +23,16 @@ _FURTHEST = 6.0
 """Standard deviations of its prior that a coefficient may reach."""
 LEAD_PRIOR = (1.0, 0.5)
 SCALED_NOMINAL = tuple(key for key in NOMINAL_KEYS if NUMBERS[key].scaled)
-"""Numbers of the plant that are known but for a factor. Radii are drawn and machined."""
+"""Numbers of the plant that are known but for a factor."""
 FRICTION_PROFILE_NAMES = tuple(f'friction_profile_{term}' for term in (1, 2, 3))
 """Coefficients of the sheath's friction profile that are fitted."""
-FORM_INDICES = {
+SCATTERED = {
     **{key: i for i, key in enumerate(NOMINAL_KEYS) if NUMBERS[key].spread},
     **{name: FRICTION_PROFILE + i for i, name in enumerate(FRICTION_PROFILE_NAMES)},
 }
-"""Places of the numbers that say of what form a healthy rig is, and where its joint rests."""
-FITTED_NOMINAL = (*SCALED_NOMINAL, *FORM_INDICES)
+"""Places of the numbers that scatter from one healthy rig to the next: of what form it is, where
+its joint rests, how its radii were machined."""
+FITTED_NOMINAL = (*SCALED_NOMINAL, *SCATTERED)
 BAND = 0.15
 """Relative tolerance by which a healthy rig differs from its description."""
 BAND_SPREAD = 0.09
@@ -119,16 +120,16 @@ def nominal_parameters(base: Array, band: float = BAND) -> tuple[FreeParameter, 
             )
         )
     share = min(band / BAND, 1.0)
-    free += [_of_form(key, float(base[index]), share) for key, index in FORM_INDICES.items()]
+    free += [_scattered(key, float(base[index]), share) for key, index in SCATTERED.items()]
     mean, spread = LEAD_PRIOR
     free.append(FreeParameter(LEAD, 'reading_lead', False, 1.0, 0.0, 1.0, mean, spread))
     return tuple(free)
 
 
-def _of_form(key: str, described: float, share: float) -> FreeParameter:
+def _scattered(key: str, described: float, share: float) -> FreeParameter:
     known = nominal_number(key)
     item = FreeParameter(
-        FORM_INDICES[key],
+        SCATTERED[key],
         key,
         False,
         known.spread,

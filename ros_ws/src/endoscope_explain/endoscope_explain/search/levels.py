@@ -3,20 +3,29 @@
 At each level all terms are screened by linear algebra, the most promising are fitted in the
 simulator, and the evidence ranks them, functions and formulas alike. Rigs in which nothing is
 missing, run through the same screen, say how much evidence there is then.
+
+Several recordings of a rig whose tube is bent differently in each keep its physics, and only its
+parameters change. Explained one by one, two of them may well be given different names for the same
+misfit: they are searched as one, by the sum of the evidence, and fitted together.
 """
 
+import math
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from endoscope_core.physics.effects import lacking
-from endoscope_explain.fit.evidence import is_noise, log_evidence
-from endoscope_explain.fit.intervals import with_form
 from endoscope_explain.fit.model import Fit
 from endoscope_explain.fit.nominal import is_at_tolerance, with_any_numbers
 from endoscope_explain.parallel import parallel_map
-from endoscope_explain.search.null_rigs import NEAR, NO_DETECTABLE_GAIN, Null, null_rigs
+from endoscope_explain.search.null_rigs import (
+    NEAR,
+    NO_DETECTABLE_GAIN,
+    Null,
+    null_of_several,
+    null_rigs,
+)
 from endoscope_explain.search.refit import (
     Candidate,
     TrialFit,
@@ -24,10 +33,13 @@ from endoscope_explain.search.refit import (
     by_fine_derivatives,
     candidate,
     converged,
+    cost_before,
     refined,
     refit,
+    term_of,
     trial_fit,
 )
+from endoscope_explain.search.repetition import motion_repeats
 from endoscope_explain.search.screen import (
     Background,
     Directions,
@@ -38,6 +50,7 @@ from endoscope_explain.search.screen import (
 )
 from endoscope_explain.search.term import (
     Term,
+    Variant,
     effects,
     functions,
 )
@@ -140,11 +153,17 @@ class Level:
 
 @dataclass(frozen=True)
 class JointSearch:
-    """What was tried on one joint."""
+    """What was tried on one joint, in one recording or in several of the same rig."""
 
     nominal: Candidate  # no term added
     # With one, two, ... terms; the last one may have found nothing.
     levels: tuple[Level, ...]
+
+    @property
+    def found(self) -> Candidate:
+        """The last candidate that was found, the nominal plant where none was."""
+        found = [level.best for level in self.levels if level.is_found]
+        return found[-1] if found else self.nominal
 
     def tried(self) -> list[Candidate]:
         """All candidates, the one without any term first."""
@@ -152,40 +171,68 @@ class JointSearch:
 
 
 def search(
-    references: tuple[Fit, ...],
+    recordings: Sequence[tuple[Fit, ...]],
     jobs: int,
     depth: int = MOST_EFFECTS,
     left_out: tuple[str, ...] = (),
+    tell: Callable[[str], None] = lambda _: None,
 ) -> JointSearch:
-    """Search what is missing from a joint: `depth` terms at most beside nominal physics."""
-    # References are the nominal plant refitted, and as described if given.
-    nominal = candidate((), references[0])
-    depth += len(lacking(references[0].model.base))
-    if not is_noise(nominal.fit):
+    """Search what is missing from a joint: `depth` terms at most beside nominal physics.
+
+    Of each recording there is the nominal plant refitted, and as described if given. In several of
+    a rig only effects are searched: a function has the range of one motion.
+    """
+    nominal = candidate((), *(references[0] for references in recordings))
+    joint = nominal.fits[0].model.observation.joint
+    depth += len(lacking(nominal.fits[0].model.base))
+    if not nominal.is_noise:
         # What only the numbers are still worth is no gain of a term.
         nominal = converged(converged(nominal))
-    parents: list[tuple[Candidate, tuple[Fit, ...]]] = [(nominal, (nominal.fit, *references[1:]))]
+    beside = zip(nominal.fits, recordings, strict=True)
+    parents = [_Parent(nominal, tuple((found, *described) for found, (_, *described) in beside))]
     levels: list[Level] = []
-    while len(parents[0][0].terms) < depth and not is_noise(parents[0][0].fit):
-        described = not any(each.adds_nothing(each.best) for each in levels)
-        level = _level(parents, jobs, left_out, other_numbers=described)
+    while len(parents[0].candidate.terms) < depth and not parents[0].candidate.is_noise:
+        changed = any(each.adds_nothing(each.best) for each in levels)
+        level = _level(parents, jobs, left_out, other_numbers=not changed)
         levels.append(level)
+        tell(f'{joint}: {_told(level)}')
         if not level.is_found:
             break
         best = level.best
         if best.adds_nominal:
             best = _from_afar(best)
-        best = replace(best, fit=with_form(best.fit, jobs))
-        found = tuple(best if c is level.best else c for c in level.found)
-        levels[-1] = level = replace(level, found=found)
-        as_another_form = best.fit.beyond_form is not None and best.fit.beyond_form <= 1.0
-        if as_another_form and not level.adds_nothing(best):
-            # Rigs of another form, in which nothing more is missing, leave as much.
-            break
+            found = tuple(best if c is level.best else c for c in level.found)
+            levels[-1] = level = replace(level, found=found)
         others = [] if level.adds_nothing(best) else [*level.variants(), *level.rivals()]
         others = [c for c in others if not level.adds_nothing(c)][: PARENTS - 1]
-        parents = [(each, (each.fit,)) for each in (best, *map(converged, others))]
+        parents = [
+            _Parent(each, tuple((own,) for own in each.fits))
+            for each in (best, *map(converged, others))
+        ]
     return JointSearch(nominal, tuple(levels))
+
+
+@dataclass(frozen=True)
+class _Parent:
+    """A candidate that is added to."""
+
+    candidate: Candidate
+    # Of each recording, the candidate's fit, and others from which a trial fit may begin.
+    references: tuple[tuple[Fit, ...], ...]
+
+
+def _told(level: Level) -> str:
+    """What came of a level, in words."""
+    if not level.found:
+        return 'no term moves anything'
+    names = ', '.join(term.id for term in level.best.terms) or 'other numbers'
+    gain = level.gain(level.best)
+    if level.is_found:
+        return f'{names}, better by {gain:.0f} nats'
+    if not level.predicts:
+        return f'not {names}: better by {gain:.0f} nats, but not on what it was not fitted to'
+    share = f'{level.p_value:.1%} of rigs without it show as much'
+    return f'not {names}: better by {gain:.0f} nats, but {share}'
 
 
 def _from_afar(one: Candidate) -> Candidate:
@@ -199,33 +246,40 @@ def _from_afar(one: Candidate) -> Candidate:
 
 
 def _level(
-    parents: Sequence[tuple[Candidate, tuple[Fit, ...]]],
-    jobs: int,
-    left_out: tuple[str, ...],
-    *,
-    other_numbers: bool,
+    parents: Sequence[_Parent], jobs: int, left_out: tuple[str, ...], *, other_numbers: bool
 ) -> Level:
-    first, _ = parents[0]
-    grown = [_grown(parent, references, jobs, left_out) for parent, references in parents]
-    found = [each for _, _, candidates in grown for each in candidates]
+    first = parents[0].candidate
+    screens = [_screen(parent, jobs, left_out) for parent in parents]
+    found = [each for screen in screens for each in _grown(screen, jobs)]
     found += [
-        converged(candidate(parent.terms, with_any_numbers(parent.fit)))
-        for parent, _ in parents
-        if other_numbers and is_at_tolerance(parent.fit)
+        converged(candidate(parent.candidate.terms, *map(with_any_numbers, parent.candidate.fits)))
+        for parent in parents
+        if other_numbers and any(map(is_at_tolerance, parent.candidate.fits))
     ]
     found.sort(key=lambda c: -c.evidence)
     ranked = tuple(_first_of_each(found, lambda c: frozenset(term.variant for term in c.terms)))
     if not ranked:
         return Level(first, (), NO_DETECTABLE_GAIN)
     ranked = _that_predict(ranked, first)
-    if not is_noise(ranked[0].fit):
+    if not ranked[0].is_noise:
         ranked = (by_fine_derivatives(ranked[0]), *ranked[1:])
-    behind, ways, _ = grown[0]
-    rigs = null_rigs(behind, ways, ranked[0].fit, jobs)
-    level = Level(first, ranked, rigs.as_screened() if rigs else NO_DETECTABLE_GAIN)
-    if rigs and not level.best.adds_nominal:
-        level = replace(level, null=rigs.beside(level.gain(level.best), FALSE_ALARMS, jobs))
+    level = _beside_nothing_missing(Level(first, ranked, NO_DETECTABLE_GAIN), screens[0], jobs)
     return replace(level, predicts=level.best.unseen_misfit < first.unseen_misfit)
+
+
+def _beside_nothing_missing(level: Level, screen: '_Screen', jobs: int) -> Level:
+    """A level with what rigs show in which nothing is missing."""
+    if len(screen.behind) > 1:
+        top = level.found[0]
+        null = null_of_several(screen.behind, screen.ways, top.fits, level.gain(top), jobs)
+        return replace(level, null=null)
+    rigs = null_rigs(screen.behind[0], screen.ways[0], level.found[0].fit, jobs)
+    if rigs is None:
+        return level
+    level = replace(level, null=rigs.as_screened())
+    if level.best.adds_nominal:
+        return level
+    return replace(level, null=rigs.beside(level.gain(level.best), FALSE_ALARMS, jobs))
 
 
 def _that_predict(ranked: tuple[Candidate, ...], first: Candidate) -> tuple[Candidate, ...]:
@@ -238,13 +292,94 @@ def _that_predict(ranked: tuple[Candidate, ...], first: Candidate) -> tuple[Cand
     return ranked
 
 
-def _grown(
-    parent: Candidate, references: tuple[Fit, ...], jobs: int, left_out: tuple[str, ...]
-) -> tuple[Background, tuple[Directions, ...], list[Candidate]]:
-    behind = background(parent.fit)
-    left = behind.left(behind.fit.residuals * behind.weight)
-    terms = (*effects(parent.fit, left_out), *functions(parent.fit, left))
-    ways = directions(behind, terms, jobs)
+@dataclass(frozen=True)
+class _Screen:
+    """Terms that may be added to a candidate, by recording."""
+
+    parent: _Parent
+    behind: tuple[Background, ...]
+    ways: tuple[tuple[Directions, ...], ...]
+
+
+def _screen(parent: _Parent, jobs: int, left_out: tuple[str, ...]) -> _Screen:
+    behind = tuple(background(found) for found in parent.candidate.fits)
+    terms = _terms(behind, left_out)
+    ways = tuple(directions(b, own, jobs) for b, own in zip(behind, terms, strict=True))
+    return _Screen(parent, behind, ways)
+
+
+def _terms(behind: Sequence[Background], left_out: tuple[str, ...]) -> list[tuple[Term, ...]]:
+    """What may be missing from the joint, of each recording."""
+    if len(behind) == 1:
+        (only,) = behind
+        left = only.left(only.fit.residuals * only.weight)
+        return [(*effects(only.fit, left_out), *functions(only.fit, left))]
+    # What was fitted to one motion is not told from time by another.
+    found = [
+        [
+            term
+            for term in effects(each.fit, left_out)
+            if not term.effect.traits.resembles_time or motion_repeats(each.fit.model.observation)
+        ]
+        for each in behind
+    ]
+    everywhere = set.intersection(*({term.id for term in terms} for terms in found))
+    return [tuple(term for term in terms if term.id in everywhere) for terms in found]
+
+
+def _grown(screen: _Screen, jobs: int) -> list[Candidate]:
+    """The parent with one term more, the best first."""
+    parent = screen.parent.candidate
+    chosen = _worth_a_fit(_trials(screen, jobs))
+    grown = parallel_map(lambda seen: refit(seen, parent), chosen, jobs)
+    grown.sort(key=lambda c: -c.evidence)
+    if grown and not grown[0].is_noise:
+        grown = _with_finer_functions(grown, screen, jobs)
+        grown = _with_their_formulas(grown, screen, jobs)
+    return _settled(grown, jobs)
+
+
+Trial = tuple[TrialFit | None, ...]
+"""A term's first fit to each recording; None where that has no use for it."""
+
+
+def _trials(screen: _Screen, jobs: int) -> list[tuple[float, Trial]]:
+    """First fits of the likely terms, with the sum of the logarithms of their costs."""
+    references = screen.parent.references
+    likely = [
+        _likely(*each, jobs) for each in zip(screen.behind, screen.ways, references, strict=True)
+    ]
+    tasks = [(n, term) for n, terms in enumerate(likely) for term in terms]
+
+    def fitted(task: tuple[int, Term]) -> TrialFit:
+        n, term = task
+        return trial_fit(references[n], term, screen.behind[n].offset)
+
+    best: dict[Variant, list[TrialFit | None]] = {}
+    for (n, term), seen in zip(tasks, parallel_map(fitted, tasks, jobs), strict=True):
+        own = best.setdefault(term.variant, [None] * len(references))
+        before = own[n]
+        if before is None or seen.cost < before.cost:
+            own[n] = seen
+    if len(references) == 1:
+        return [(math.log(seen.cost), (seen,)) for (seen,) in best.values() if seen is not None]
+    without = [cost_before(found) for found, *_ in references]
+    trials = []
+    for own in best.values():
+        used = tuple(
+            seen if seen is not None and seen.cost < cost else None
+            for seen, cost in zip(own, without, strict=True)
+        )
+        costs = [c if seen is None else seen.cost for seen, c in zip(used, without, strict=True)]
+        if any(seen is not None for seen in used):
+            trials.append((sum(map(math.log, costs)), used))
+    return trials
+
+
+def _likely(
+    behind: Background, ways: tuple[Directions, ...], references: tuple[Fit, ...], jobs: int
+) -> list[Term]:
+    """Terms of one recording that are worth a first fit."""
     likely = _best_screened(screened(behind, ways))
     for described in references[1:]:
         # What is missing has bent the fitted numbers, but not the described ones.
@@ -252,14 +387,7 @@ def _grown(
         terms = tuple(way.term for way in ways if not way.term.is_function)
         more = _best_screened(screened(unbent, directions(unbent, terms, jobs)))
         likely += [term for term in more if term.variant not in {t.variant for t in likely}]
-    trials = parallel_map(lambda term: trial_fit(references, term, behind.offset), likely, jobs)
-    chosen = _worth_a_fit(trials)
-    grown = parallel_map(lambda seen: refit(seen, parent), chosen, jobs)
-    grown.sort(key=lambda c: -c.evidence)
-    if grown and not is_noise(grown[0].fit):
-        grown = _with_finer_functions(grown, behind, jobs)
-        grown = _with_their_formulas(grown, parent, behind, [way.term for way in ways], jobs)
-    return behind, ways, _settled(grown, jobs)
+    return likely
 
 
 def _settled(grown: list[Candidate], jobs: int) -> list[Candidate]:
@@ -273,33 +401,30 @@ def _settled(grown: list[Candidate], jobs: int) -> list[Candidate]:
     return [*settled, *waiting]
 
 
-def _with_finer_functions(grown: list[Candidate], behind: Background, jobs: int) -> list[Candidate]:
+def _with_finer_functions(grown: list[Candidate], screen: _Screen, jobs: int) -> list[Candidate]:
     """Candidates, best first, whose best functions are as fine as there is evidence for."""
-    functions = [c for c in _near_the_best(grown, behind) if c.terms[-1].is_function][:REFINED]
+    near = _near_the_best(grown, screen.parent.candidate)
+    functions = [c for c in near if c.terms[-1].is_function][:REFINED]
     rest = [c for c in grown if all(c is not each for each in functions)]
+    behind = screen.behind[0]
     finer = parallel_map(lambda c: refined(c, behind.fit, behind.offset), functions, jobs)
     return sorted([*finer, *rest], key=lambda c: -c.evidence)
 
 
-def _near_the_best(grown: list[Candidate], behind: Background) -> list[Candidate]:
+def _near_the_best(grown: list[Candidate], parent: Candidate) -> list[Candidate]:
     """Candidates, best first, that may yet become the best one."""
-    without = log_evidence(behind.fit)
-    least = NEAR * (grown[0].evidence - without)
-    return [c for c in grown if c.evidence - without >= least]
+    least = NEAR * (grown[0].evidence - parent.evidence)
+    return [c for c in grown if c.evidence - parent.evidence >= least]
 
 
-def _with_their_formulas(
-    grown: list[Candidate],
-    parent: Candidate,
-    behind: Background,
-    terms: list[Term],
-    jobs: int,
-) -> list[Candidate]:
+def _with_their_formulas(grown: list[Candidate], screen: _Screen, jobs: int) -> list[Candidate]:
     """Candidates, best first, with formulas fitted from the numbers that functions leave."""
     # What is missing bends the other numbers, and a formula far from linear, begun beside bent
     # ones, ends anywhere. The function at its place has set them straight.
+    parent, behind = screen.parent.candidate, screen.behind[0]
+    terms = [way.term for way in screen.ways[0]]
     tasks: list[tuple[Candidate, list[Term]]] = []
-    for function in (c for c in _near_the_best(grown, behind) if c.terms[-1].is_function):
+    for function in (c for c in _near_the_best(grown, parent) if c.terms[-1].is_function):
         starts: dict[str, list[Term]] = {}
         for term in terms:
             if not term.is_function and term.shares_place(function.terms[-1]):
@@ -308,7 +433,7 @@ def _with_their_formulas(
 
     def fitted(task: tuple[Candidate, list[Term]]) -> Candidate:
         function, own = task
-        return refit(begun_beside(function.fit, parent.fit, own, behind.offset), parent)
+        return refit((begun_beside(function.fit, parent.fit, own, behind.offset),), parent)
 
     more = parallel_map(fitted, tasks, jobs)
     every = sorted([*grown, *more], key=lambda c: -c.evidence)
@@ -341,13 +466,12 @@ def _first_of_each[T](ranked: Iterable[T], kind: Callable[[T], Hashable]) -> lis
     return list(first.values())
 
 
-def _worth_a_fit(trials: list[TrialFit]) -> list[TrialFit]:
+def _worth_a_fit(trials: list[tuple[float, Trial]]) -> list[Trial]:
     """The best after a first fit, what is nominal, and all that are at the place of the best."""
-    trials = sorted(trials, key=lambda seen: seen.cost)
-    ranked = _first_of_each(trials, lambda seen: seen.term.variant)
+    ranked = [seen for _, seen in sorted(trials, key=lambda each: each[0])]
     chosen = ranked[:REFITTED]
     return chosen + [
         seen
         for seen in ranked[REFITTED:]
-        if seen.term.is_nominal or seen.term.shares_place(chosen[0].term)
+        if term_of(seen).is_nominal or term_of(seen).shares_place(term_of(chosen[0]))
     ]

@@ -6,6 +6,7 @@ chance of a false alarm over the whole search (a parametric bootstrap of the lar
 Tibshirani, An Introduction to the Bootstrap, 1993, ch. 16).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -71,7 +72,7 @@ class Shown:
     rigs: Array  # (size, B), what the drawn rigs are off by, in noise units
 
 
-def shown(behind: Background, ways: tuple[Directions, ...], best: Fit | None, jobs: int) -> Shown:
+def shown(behind: Background, ways: tuple[Directions, ...], best: Fit, jobs: int) -> Shown:
     """Run the screen over the recording and over rigs in which nothing is missing."""
     found, observation = behind.fit, behind.fit.model.observation
     generator = np.random.default_rng(_SEED)
@@ -102,7 +103,7 @@ def shown(behind: Background, ways: tuple[Directions, ...], best: Fit | None, jo
     off = above_noise(found.residuals)
     # Where noise alone is left, no form misleads.
     remains = np.zeros_like(off)
-    if best is not None and not is_noise(best):
+    if not is_noise(best):
         remains = above_noise(best.residuals)
     as_off = np.sqrt(np.sum(number * floor * off) / np.maximum(whole, _TINY))
     as_left = np.sqrt(np.sum(number * floor * remains) / np.maximum(rest, _TINY))
@@ -159,6 +160,50 @@ class NullRigs:
             if null.p_value(gain) > level or np.max(drawn[rigs]) < NEAR * gain:
                 break
         return null
+
+
+def null_of_several(
+    behind: Sequence[Background],
+    ways: Sequence[tuple[Directions, ...]],
+    best: Sequence[Fit],
+    gain: float,
+    jobs: int,
+) -> Null:
+    """What rigs show of several recordings together, beside the gain of the best term's fits."""
+    # One term is tried for that serves all of them, and the best of each recording would gain more.
+    # Every shape of the tube has a profile of its own, so that what is drawn for one says nothing
+    # of another.
+    generator = np.random.default_rng(_SEED)
+    order = generator.permuted(np.tile(np.arange(FORMS + WANDERING), (len(behind), 1)), axis=1)
+    by_recording = [
+        _of_each_effect(*each, jobs) for each in zip(behind, ways, best, order, strict=True)
+    ]
+    everywhere = set.intersection(*(set(each) for each in by_recording))
+    if not everywhere:
+        return NO_DETECTABLE_GAIN
+    sums = [np.sum([each[effect] for each in by_recording], axis=0) for effect in everywhere]
+    observed, drawn, doubt = np.split(np.max(sums, axis=0), [1, 1 + FORMS + WANDERING])
+    # A fit adds to what the screen says of a rig what it adds to it of the recordings.
+    scale = gain / observed[0] if observed[0] > 0.0 else np.inf
+    return Null(scale * drawn, scale * doubt)
+
+
+def _of_each_effect(
+    behind: Background,
+    ways: tuple[Directions, ...],
+    best: Fit,
+    order: NDArray[np.int64],
+    jobs: int,
+) -> dict[str, Array]:
+    """Gains of each effect by the screen: on the recording, drawn and doubted (1 + B + B,)."""
+    if not ways:
+        return {}
+    seen = shown(behind, ways, best, jobs)
+    rows = np.column_stack([seen.observed, seen.drawn[:, order], seen.doubt[:, order]])
+    gained: dict[str, Array] = {}
+    for way, row in zip(ways, rows, strict=True):
+        gained[way.term.id] = np.maximum(gained.get(way.term.id, row), row)
+    return gained
 
 
 def null_rigs(

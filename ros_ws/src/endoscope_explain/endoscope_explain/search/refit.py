@@ -1,4 +1,4 @@
-"""Fit a joint with one term more.
+"""Fit a joint with one term more, in one recording or in several of the same rig together.
 
 The derivative by the numbers that the fit without it has is shared by all terms that are tried and
 corrected by Broyden's rank-one update (Broyden, Math. Comp. 19, 1965), so that a trial fit costs
@@ -16,12 +16,14 @@ from endoscope_core.physics.functions.places import NODES
 from endoscope_explain.fit.evidence import (
     held_out_misfit,
     held_out_residuals,
+    is_noise,
     log_evidence,
     weights,
 )
 from endoscope_explain.fit.family import COEFFICIENTS, Family, visited_range
 from endoscope_explain.fit.free_parameters import COORDINATE
 from endoscope_explain.fit.model import Fit, JointModel, broyden_fit, fit, jacobian
+from endoscope_explain.fit.pooled import fit_together, with_common_numbers
 from endoscope_explain.fit.valleys import out_of_valleys
 from endoscope_explain.search.term import Term, states_of
 
@@ -37,21 +39,37 @@ stands."""
 
 @dataclass(frozen=True)
 class Candidate:
-    """A fitted joint with some terms."""
+    """A fitted joint with some terms, in one recording or in several of the same rig."""
 
     terms: tuple[Term, ...]  # in the order in which they were added
-    fit: Fit
-    evidence: float  # see `log_evidence`
+    fits: tuple[
+        Fit, ...
+    ]  # one of each recording; one of several that has no use for a term lacks it
+    evidence: float  # of all recordings; see `log_evidence`
+
+    @property
+    def fit(self) -> Fit:
+        """The fit of the only recording."""
+        (only,) = self.fits
+        return only
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether nothing is left to explain in any recording."""
+        return all(is_noise(each) for each in self.fits)
 
     @cached_property
-    def unseen(self) -> Array:
-        """Residuals (size,) of a refit that has not seen the held-out blocks."""
-        return held_out_residuals(self.fit)
+    def unseen(self) -> tuple[Array, ...]:
+        """Residuals (size,) of refits that have not seen the held-out blocks."""
+        return tuple(held_out_residuals(each) for each in self.fits)
 
     @cached_property
     def unseen_misfit(self) -> float:
-        """What that refit leaves on these blocks; see `held_out_misfit`."""
-        return held_out_misfit(self.fit.model.observation, self.unseen)
+        """What these refits leave on these blocks; see `held_out_misfit`."""
+        return sum(
+            held_out_misfit(each.model.observation, left)
+            for each, left in zip(self.fits, self.unseen, strict=True)
+        )
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -64,9 +82,9 @@ class Candidate:
         return bool(self.terms) and self.terms[-1].is_nominal
 
 
-def candidate(terms: tuple[Term, ...], found: Fit) -> Candidate:
-    """A fit with its evidence."""
-    return Candidate(terms, found, log_evidence(found))
+def candidate(terms: tuple[Term, ...], *fits: Fit) -> Candidate:
+    """Fits with their evidence."""
+    return Candidate(terms, fits, sum(log_evidence(each) for each in fits))
 
 
 @dataclass(frozen=True)
@@ -99,6 +117,12 @@ def trial_fit(references: tuple[Fit, ...], term: Term, offset: Array) -> TrialFi
     return best
 
 
+def cost_before(found: Fit) -> float:
+    """Half the squares of a fit, weighted as those of a trial fit beside it are."""
+    weight = weights(found.model.observation, found.residuals)
+    return found.model.cost(weight * found.residuals, found.theta)
+
+
 def begun_beside(function: Fit, without: Fit, starts: Sequence[Term], offset: Array) -> TrialFit:
     """The start of a formula that leaves least beside the numbers of a fit with its function."""
     weight = weights(function.model.observation, without.residuals)
@@ -114,13 +138,30 @@ def begun_beside(function: Fit, without: Fit, starts: Sequence[Term], offset: Ar
     return best
 
 
-def refit(seen: TrialFit, without: Candidate) -> Candidate:
-    """Fit of a term on coarse ticks from its trial fit, as far as tells which term is the best."""
+def term_of(seen: Sequence[TrialFit | None]) -> Term:
+    """The term that trial fits of all recordings share, as it begins in the first of them."""
+    return next(each.term for each in seen if each is not None)
+
+
+def refit(seen: Sequence[TrialFit | None], without: Candidate) -> Candidate:
+    """Fit of a term from its trial fits, as far as tells which term is the best."""
+    # A recording that has no use for the term, None, stays without it.
+    fits = [
+        own if each is None else _refit(each, own)
+        for each, own in zip(seen, without.fits, strict=True)
+    ]
+    if len(fits) > 1:
+        fits = fit_together([f.model for f in fits], [f.theta for f in fits], rough=True)
+    return candidate((*without.terms, term_of(seen)), *fits)
+
+
+def _refit(seen: TrialFit, without: Fit) -> Fit:
+    """Fit of a term to one recording on coarse ticks."""
     # By what the fit without it is off, channels are weighted at first; then by what is left.
-    weight = weights(seen.model.observation, without.fit.residuals)
+    weight = weights(seen.model.observation, without.residuals)
     found = _twice(seen.model, seen.coarse.offset, seen.theta, weight)
     found = out_of_valleys(found, weights(seen.model.observation, found.residuals))
-    return candidate((*without.terms, seen.term), _on_fine_ticks(found, seen.model))
+    return _on_fine_ticks(found, seen.model)
 
 
 def refined(one: Candidate, without: Fit, offset: Array) -> Candidate:
@@ -175,13 +216,26 @@ def _on_fine_ticks(found: Fit, model: JointModel) -> Fit:
 
 def converged(one: Candidate) -> Candidate:
     """A candidate fitted on fine ticks until nothing moves any more."""
+    if len(one.fits) > 1:
+        return _converged_together(one)
     weight = weights(one.fit.model.observation, one.fit.residuals)
     found = fit(one.fit.model, one.fit.theta, weight, ITERATIONS, SETTLED, one.fit.jacobian)
     return candidate(one.terms, found)
 
 
+def _converged_together(one: Candidate) -> Candidate:
+    # A fit by itself may lie in another valley than those of the same rig in other shapes: it is
+    # begun as well where all recordings are alike.
+    models = [each.model for each in one.fits]
+    starts = [each.theta for each in one.fits], with_common_numbers(one.fits)
+    found = [candidate(one.terms, *fit_together(models, start)) for start in starts]
+    return max(found, key=lambda each: each.evidence)
+
+
 def by_fine_derivatives(one: Candidate) -> Candidate:
     """A candidate fitted on by derivatives on fine ticks, where coarse ones may mislead."""
+    if len(one.fits) > 1:
+        return one  # fitted together by such derivatives
     model = replace(one.fit.model, coarse=1)
     weight = weights(model.observation, one.fit.residuals)
     found = fit(model, one.fit.theta, weight, tolerance=SETTLED)

@@ -42,6 +42,6 @@ def test_whatever_is_put_together_a_joint_holds_each_term_once(described, picks)
         found = replace(found, model=model, theta=theta, jacobian=slopes)
         terms = (*terms, chosen)
     known = tuple(term for term in terms if not term.is_function)
-    made = plant_of(plant, [Candidate(known, found, 0.0)])
+    made = plant_of(plant, [Candidate(known, (found,), 0.0)])
     assert [each.id for each in made.effects] == [term.id for term in known]
     pack(made)

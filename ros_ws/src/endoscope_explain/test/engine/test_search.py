@@ -115,7 +115,7 @@ def test_gains_by_linear_algebra_are_those_of_the_residuals_themselves(reference
 
 def test_an_effect_is_found_by_its_formula_with_nothing_left(references):
     hidden = effect('joint_backlash', gap_rad=0.05)
-    tried = search(references(hidden), 2)
+    tried = search([references(hidden)], 2)
     decision = decide(tried, 2)
     assert [term.name for term in decision.missing] == [hidden.id]
     assert decision.missing[0].alternatives == ()
@@ -130,19 +130,19 @@ def test_two_effects_are_found_one_after_the_other(references):
         effect('joint_inertia', inertia_kg_m2=2e-5),
         effect('tracker_drift', rate_rad_per_s=0.002),
     )
-    decision = decide(search(references(*hidden, seconds=10.0), 2), 2)
+    decision = decide(search([references(*hidden, seconds=10.0)], 2), 2)
     assert {term.name for term in decision.missing} == {each.id for each in hidden}
     assert is_noise(decision.chosen.fit)
 
 
 def test_nothing_is_searched_where_only_noise_is_left(references):
-    tried = search(references(), 2)
+    tried = search([references()], 2)
     assert tried.levels == ()
     assert decide(tried, 2).missing == ()
 
 
 def _candidate(evidence, *terms, found=None):
-    return Candidate(terms, found, evidence)
+    return Candidate(terms, (found,), evidence)
 
 
 def _level(evidences, null):
@@ -200,7 +200,7 @@ def test_what_loses_on_blocks_not_seen_gives_way_to_what_predicts_them(monkeypat
     monkeypatch.setattr(
         Candidate, 'unseen_misfit', property(lambda one: left.get(one.fit in predicting))
     )
-    named = tuple(replace(each, fit=each.terms[0].id) for each in found)
+    named = tuple(replace(each, fits=(each.terms[0].id,)) for each in found)
     assert [c.fit for c in levels._that_predict(named, first)] == ['gravity', 'tracker_delay']
     predicting.clear()
     assert levels._that_predict(named, first) == named
@@ -211,7 +211,7 @@ def test_a_finer_sheath_alone_is_not_named(one_joint):
     plant = one_joint.rig()
     true = one_joint.rig(friction_profile=(0.0, 0.2, -0.1, 0.5, -0.4, 0.3))
     (observation,) = observe(one_joint.record(true, one_joint.motion(7.0)), plant)
-    tried = search(nominal_references(observation, *packed_joint(plant, 'bend_x')), 2)
+    tried = search([nominal_references(observation, *packed_joint(plant, 'bend_x'))], 2)
     assert decide(tried, 2).missing == ()
 
 

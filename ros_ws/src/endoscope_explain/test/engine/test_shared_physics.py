@@ -10,8 +10,10 @@ from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.fit.model import fit
 from endoscope_explain.fit.nominal import with_references
 from endoscope_explain.observe.observation import observe
-from endoscope_explain.search.term import with_effect
-from endoscope_explain.shared_physics import SharedChoice, shared_effects
+from endoscope_explain.search.null_rigs import null_of_several, shown
+from endoscope_explain.search.screen import background, directions
+from endoscope_explain.search.term import effects, with_effect
+from endoscope_explain.shared_physics import shared_effects
 
 GAIN = 0.9
 TUBES = (0.8, 1.0)
@@ -48,8 +50,19 @@ def chosen(references):
 
 
 def test_another_form_gains_by_one_effect_for_all_recordings(references):
-    own = [SharedChoice('bend_x', (), (each['bend_x'],)).null(2)[1].drawn for each in references]
-    both = SharedChoice('bend_x', (), tuple(each['bend_x'] for each in references)).null(2)[1].drawn
+    fits = [each['bend_x'][0] for each in references]
+    behind = [background(found) for found in fits]
+    ways = [directions(each, effects(each.fit), 2) for each in behind]
+    each = list(zip(behind, ways, fits, strict=True))
+    screened = [shown(*one, 2) for one in each]
+    best = {w[int(np.argmax(s.observed))].term.id for w, s in zip(ways, screened, strict=True)}
+    assert best == {'load_cell_gain'}
+    gains = [float(s.observed.max()) for s in screened]
+    own = [
+        null_of_several([b], [w], [f], gain, 2).drawn
+        for (b, w, f), gain in zip(each, gains, strict=True)
+    ]
+    both = null_of_several(behind, ways, fits, sum(gains), 2).drawn
     assert np.mean(both) < np.mean(own[0]) + np.mean(own[1]) - 1.0
 
 
