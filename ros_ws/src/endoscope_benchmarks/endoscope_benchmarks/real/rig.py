@@ -54,7 +54,11 @@ def wide(observation: JointObservation) -> JointModel:
     """The nominal plant with all its numbers free, the joint's radius with them."""
     base, flags = packed_joint(PLANT, JOINT)
     servo = {p.index: p for p in nominal_parameters(base) if p.name in SERVO}
-    free = [servo.get(p.index, p) for p in nominal_parameters(base, BAND) if p.index != LEAD]
+    free = [
+        servo.get(p.index, p)
+        for p in nominal_parameters(base, BAND)
+        if p.index not in (LEAD, JOINT_RADIUS)
+    ]
     like = next(p for p in free if p.name == 'joint_stiffness')
     centre, reach = float(base[JOINT_RADIUS]), like.high / math.exp(like.mean)
     radius = replace(
