@@ -9,8 +9,7 @@ parameters change. Explained one by one, two of them may well be given different
 misfit: they are searched as one, by the sum of the evidence, and fitted together.
 """
 
-import math
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,9 +17,14 @@ import numpy as np
 from endoscope_core.physics.effects import lacking
 from endoscope_explain.fit.model import Fit
 from endoscope_explain.fit.nominal import is_at_tolerance, with_any_numbers
-from endoscope_explain.parallel import parallel_map
+from endoscope_explain.search.expansion import (
+    Parent,
+    Screened,
+    expanded,
+    first_of_each,
+    screen_terms,
+)
 from endoscope_explain.search.null_rigs import (
-    NEAR,
     NO_DETECTABLE_GAIN,
     Null,
     null_of_several,
@@ -28,46 +32,15 @@ from endoscope_explain.search.null_rigs import (
 )
 from endoscope_explain.search.refit import (
     Candidate,
-    TrialFit,
-    begun_beside,
     by_fine_derivatives,
     candidate,
     converged,
-    cost_before,
-    refined,
-    refit,
-    term_of,
-    trial_fit,
-)
-from endoscope_explain.search.repetition import motion_repeats
-from endoscope_explain.search.screen import (
-    Background,
-    Directions,
-    background,
-    by_variant,
-    directions,
-    screened,
-)
-from endoscope_explain.search.term import (
-    Term,
-    Variant,
-    effects,
-    functions,
 )
 
 MOST_EFFECTS = 2
 FALSE_ALARMS = 0.025
 """Chance that rigs in which nothing is missing show as much, above which no term is added: 2 % are
 wanted, and 39 rigs tell no less."""
-TRIED, REFITTED = 10, 4
-"""Terms that get a first fit and a full one: in the study the truth was among the first three of
-the screen in 46 cases of 48, and among the first five in 47."""
-STARTS = 2
-"""Starting points of each: far from linear, that of the largest linearised gain may fit least."""
-REFINED = 3
-"""Functions of these, the best, that are let vary faster."""
-SETTLED = 2
-"""Of these the best ones and those at the place of the best are fitted until they stand."""
 MOST_FITS, WORTH_A_FIT = 6, 1.0
 """Fits of what every rig has, without which all other numbers were bent, and the gain of evidence
 in nats that is worth another one."""
@@ -189,7 +162,7 @@ def search(
         # What only the numbers are still worth is no gain of a term.
         nominal = converged(converged(nominal))
     beside = zip(nominal.fits, recordings, strict=True)
-    parents = [_Parent(nominal, tuple((found, *described) for found, (_, *described) in beside))]
+    parents = [Parent(nominal, tuple((found, *described) for found, (_, *described) in beside))]
     levels: list[Level] = []
     while len(parents[0].candidate.terms) < depth and not parents[0].candidate.is_noise:
         changed = any(each.adds_nothing(each.best) for each in levels)
@@ -206,19 +179,10 @@ def search(
         others = [] if level.adds_nothing(best) else [*level.variants(), *level.rivals()]
         others = [c for c in others if not level.adds_nothing(c)][: PARENTS - 1]
         parents = [
-            _Parent(each, tuple((own,) for own in each.fits))
+            Parent(each, tuple((own,) for own in each.fits))
             for each in (best, *map(converged, others))
         ]
     return JointSearch(nominal, tuple(levels))
-
-
-@dataclass(frozen=True)
-class _Parent:
-    """A candidate that is added to."""
-
-    candidate: Candidate
-    # Of each recording, the candidate's fit, and others from which a trial fit may begin.
-    references: tuple[tuple[Fit, ...], ...]
 
 
 def _told(level: Level) -> str:
@@ -246,18 +210,18 @@ def _from_afar(one: Candidate) -> Candidate:
 
 
 def _level(
-    parents: Sequence[_Parent], jobs: int, left_out: tuple[str, ...], *, other_numbers: bool
+    parents: Sequence[Parent], jobs: int, left_out: tuple[str, ...], *, other_numbers: bool
 ) -> Level:
     first = parents[0].candidate
-    screens = [_screen(parent, jobs, left_out) for parent in parents]
-    found = [each for screen in screens for each in _grown(screen, jobs)]
+    screens = [screen_terms(parent, jobs, left_out) for parent in parents]
+    found = [each for screen in screens for each in expanded(screen, jobs)]
     found += [
         converged(candidate(parent.candidate.terms, *map(with_any_numbers, parent.candidate.fits)))
         for parent in parents
         if other_numbers and any(map(is_at_tolerance, parent.candidate.fits))
     ]
     found.sort(key=lambda c: -c.evidence)
-    ranked = tuple(_first_of_each(found, lambda c: frozenset(term.variant for term in c.terms)))
+    ranked = tuple(first_of_each(found, lambda c: frozenset(term.variant for term in c.terms)))
     if not ranked:
         return Level(first, (), NO_DETECTABLE_GAIN)
     ranked = _that_predict(ranked, first)
@@ -267,7 +231,7 @@ def _level(
     return replace(level, predicts=level.best.unseen_misfit < first.unseen_misfit)
 
 
-def _beside_nothing_missing(level: Level, screen: '_Screen', jobs: int) -> Level:
+def _beside_nothing_missing(level: Level, screen: Screened, jobs: int) -> Level:
     """A level with what rigs show in which nothing is missing."""
     if len(screen.behind) > 1:
         top = level.found[0]
@@ -290,188 +254,3 @@ def _that_predict(ranked: tuple[Candidate, ...], first: Candidate) -> tuple[Cand
         if each.evidence > first.evidence and each.unseen_misfit < first.unseen_misfit:
             return ranked[k:]
     return ranked
-
-
-@dataclass(frozen=True)
-class _Screen:
-    """Terms that may be added to a candidate, by recording."""
-
-    parent: _Parent
-    behind: tuple[Background, ...]
-    ways: tuple[tuple[Directions, ...], ...]
-
-
-def _screen(parent: _Parent, jobs: int, left_out: tuple[str, ...]) -> _Screen:
-    behind = tuple(background(found) for found in parent.candidate.fits)
-    terms = _terms(behind, left_out)
-    ways = tuple(directions(b, own, jobs) for b, own in zip(behind, terms, strict=True))
-    return _Screen(parent, behind, ways)
-
-
-def _terms(behind: Sequence[Background], left_out: tuple[str, ...]) -> list[tuple[Term, ...]]:
-    """What may be missing from the joint, of each recording."""
-    if len(behind) == 1:
-        (only,) = behind
-        left = only.left(only.fit.residuals * only.weight)
-        return [(*effects(only.fit, left_out), *functions(only.fit, left))]
-    # What was fitted to one motion is not told from time by another.
-    found = [
-        [
-            term
-            for term in effects(each.fit, left_out)
-            if not term.effect.traits.resembles_time or motion_repeats(each.fit.model.observation)
-        ]
-        for each in behind
-    ]
-    everywhere = set.intersection(*({term.id for term in terms} for terms in found))
-    return [tuple(term for term in terms if term.id in everywhere) for terms in found]
-
-
-def _grown(screen: _Screen, jobs: int) -> list[Candidate]:
-    """The parent with one term more, the best first."""
-    parent = screen.parent.candidate
-    chosen = _worth_a_fit(_trials(screen, jobs))
-    grown = parallel_map(lambda seen: refit(seen, parent), chosen, jobs)
-    grown.sort(key=lambda c: -c.evidence)
-    if grown and not grown[0].is_noise:
-        grown = _with_finer_functions(grown, screen, jobs)
-        grown = _with_their_formulas(grown, screen, jobs)
-    return _settled(grown, jobs)
-
-
-Trial = tuple[TrialFit | None, ...]
-"""A term's first fit to each recording; None where that has no use for it."""
-
-
-def _trials(screen: _Screen, jobs: int) -> list[tuple[float, Trial]]:
-    """First fits of the likely terms, with the sum of the logarithms of their costs."""
-    references = screen.parent.references
-    likely = [
-        _likely(*each, jobs) for each in zip(screen.behind, screen.ways, references, strict=True)
-    ]
-    tasks = [(n, term) for n, terms in enumerate(likely) for term in terms]
-
-    def fitted(task: tuple[int, Term]) -> TrialFit:
-        n, term = task
-        return trial_fit(references[n], term, screen.behind[n].offset)
-
-    best: dict[Variant, list[TrialFit | None]] = {}
-    for (n, term), seen in zip(tasks, parallel_map(fitted, tasks, jobs), strict=True):
-        own = best.setdefault(term.variant, [None] * len(references))
-        before = own[n]
-        if before is None or seen.cost < before.cost:
-            own[n] = seen
-    if len(references) == 1:
-        return [(math.log(seen.cost), (seen,)) for (seen,) in best.values() if seen is not None]
-    without = [cost_before(found) for found, *_ in references]
-    trials = []
-    for own in best.values():
-        used = tuple(
-            seen if seen is not None and seen.cost < cost else None
-            for seen, cost in zip(own, without, strict=True)
-        )
-        costs = [c if seen is None else seen.cost for seen, c in zip(used, without, strict=True)]
-        if any(seen is not None for seen in used):
-            trials.append((sum(map(math.log, costs)), used))
-    return trials
-
-
-def _likely(
-    behind: Background, ways: tuple[Directions, ...], references: tuple[Fit, ...], jobs: int
-) -> list[Term]:
-    """Terms of one recording that are worth a first fit."""
-    likely = _best_screened(screened(behind, ways))
-    for described in references[1:]:
-        # What is missing has bent the fitted numbers, but not the described ones.
-        unbent = background(described)
-        terms = tuple(way.term for way in ways if not way.term.is_function)
-        more = _best_screened(screened(unbent, directions(unbent, terms, jobs)))
-        likely += [term for term in more if term.variant not in {t.variant for t in likely}]
-    return likely
-
-
-def _settled(grown: list[Candidate], jobs: int) -> list[Candidate]:
-    """The best candidates, and those at the place of the best, fitted until they stand."""
-    waiting, settled = list(grown), list[Candidate]()
-    while waiting and waiting[0] is max([*settled, *waiting], key=lambda c: c.evidence):
-        now = waiting[:SETTLED]
-        now += [c for c in waiting[SETTLED:] if c.terms[-1].shares_place(now[0].terms[-1])]
-        waiting = [c for c in waiting if all(c is not each for each in now)]
-        settled += parallel_map(converged, now, jobs)
-    return [*settled, *waiting]
-
-
-def _with_finer_functions(grown: list[Candidate], screen: _Screen, jobs: int) -> list[Candidate]:
-    """Candidates, best first, whose best functions are as fine as there is evidence for."""
-    near = _near_the_best(grown, screen.parent.candidate)
-    functions = [c for c in near if c.terms[-1].is_function][:REFINED]
-    rest = [c for c in grown if all(c is not each for each in functions)]
-    behind = screen.behind[0]
-    finer = parallel_map(lambda c: refined(c, behind.fit, behind.offset), functions, jobs)
-    return sorted([*finer, *rest], key=lambda c: -c.evidence)
-
-
-def _near_the_best(grown: list[Candidate], parent: Candidate) -> list[Candidate]:
-    """Candidates, best first, that may yet become the best one."""
-    least = NEAR * (grown[0].evidence - parent.evidence)
-    return [c for c in grown if c.evidence - parent.evidence >= least]
-
-
-def _with_their_formulas(grown: list[Candidate], screen: _Screen, jobs: int) -> list[Candidate]:
-    """Candidates, best first, with formulas fitted from the numbers that functions leave."""
-    # What is missing bends the other numbers, and a formula far from linear, begun beside bent
-    # ones, ends anywhere. The function at its place has set them straight.
-    parent, behind = screen.parent.candidate, screen.behind[0]
-    terms = [way.term for way in screen.ways[0]]
-    tasks: list[tuple[Candidate, list[Term]]] = []
-    for function in (c for c in _near_the_best(grown, parent) if c.terms[-1].is_function):
-        starts: dict[str, list[Term]] = {}
-        for term in terms:
-            if not term.is_function and term.shares_place(function.terms[-1]):
-                starts.setdefault(term.id, []).append(term)
-        tasks += [(function, own) for own in starts.values()]
-
-    def fitted(task: tuple[Candidate, list[Term]]) -> Candidate:
-        function, own = task
-        return refit((begun_beside(function.fit, parent.fit, own, behind.offset),), parent)
-
-    more = parallel_map(fitted, tasks, jobs)
-    every = sorted([*grown, *more], key=lambda c: -c.evidence)
-    return _first_of_each(every, lambda c: c.terms[-1].variant)
-
-
-def _best_screened(ranked: list[Term]) -> list[Term]:
-    """The best terms, starts of each, and the formulas at the places of the best functions."""
-    # The linearised gain of a formula that is far from linear is little at a start that is far from
-    # the truth; the function at its place is not misled by that. Nominal physics is fitted in any
-    # case.
-    variants = by_variant(ranked)
-    chosen = [term for own in variants[:TRIED] for term in own[:STARTS]]
-    terms = [own[0] for own in variants[TRIED:]]
-    functions = [term for term in chosen if term.is_function][:REFITTED]
-    chosen += [
-        term
-        for term in terms
-        if not term.is_function and any(term.shares_place(each) for each in functions)
-    ]
-    chosen += [t for own in variants for t in own if t.is_nominal and t not in chosen]
-    return chosen
-
-
-def _first_of_each[T](ranked: Iterable[T], kind: Callable[[T], Hashable]) -> list[T]:
-    """The first one of each kind, in their order."""
-    first: dict[Hashable, T] = {}
-    for each in ranked:
-        first.setdefault(kind(each), each)
-    return list(first.values())
-
-
-def _worth_a_fit(trials: list[tuple[float, Trial]]) -> list[Trial]:
-    """The best after a first fit, what is nominal, and all that are at the place of the best."""
-    ranked = [seen for _, seen in sorted(trials, key=lambda each: each[0])]
-    chosen = ranked[:REFITTED]
-    return chosen + [
-        seen
-        for seen in ranked[REFITTED:]
-        if term_of(seen).is_nominal or term_of(seen).shares_place(term_of(chosen[0]))
-    ]
