@@ -6,7 +6,7 @@ from simulated_graph import SimulatedGraph
 
 from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.client.graph_client import GraphClient, joined_graph
-from endoscope_nodes.client.graph_listener import GraphRefusedError
+from endoscope_nodes.client.graph_listener import GraphError
 from endoscope_nodes.names import DIAGNOSTICS
 
 ABORTED = 'aborted: the motion session has ended'
@@ -59,7 +59,7 @@ def calibrate(graph, happens):
 
 
 def test_a_calibration_that_ends_before_it_is_heard_of_is_told(graph):
-    with pytest.raises(GraphRefusedError, match=ABORTED):
+    with pytest.raises(GraphError, match=ABORTED):
         calibrate(graph, lambda: graph.command('pause'))
 
 
@@ -69,12 +69,12 @@ def test_one_that_ends_in_the_instant_in_which_it_began_is_told(graph):
         assert calibration.ticker.now_ns() == calibration._began_ns
         calibration._session.leave('the test ends it')
 
-    with pytest.raises(GraphRefusedError, match=ABORTED):
+    with pytest.raises(GraphError, match=ABORTED):
         calibrate(graph, lose_the_session)
 
 
 def test_a_result_that_was_there_before_is_not_taken(graph):
-    with pytest.raises(GraphRefusedError, match=ABORTED):
+    with pytest.raises(GraphError, match=ABORTED):
         calibrate(graph, lambda: graph.command('disable'))
     enable(graph)
     first = calibrate(graph, lambda: None)
@@ -98,7 +98,7 @@ def test_an_order_is_known_by_codes_whatever_is_said_of_it(graph, monkeypatch):
     monkeypatch.setattr(calibration, '_tell', lambda last, code='': tell(f'so: {last}', code))
     assert go_home(graph, lambda: None) == 'so: home reached'
     # The one before, which ended well, is latched.
-    with pytest.raises(GraphRefusedError, match=r'so: aborted while .*: the motion session has'):
+    with pytest.raises(GraphError, match=r'so: aborted while .*: the motion session has'):
         go_home(graph, lambda: graph.command('pause'))
     enable(graph)
     assert calibrate(graph, lambda: None).level == 0
@@ -109,12 +109,12 @@ def test_a_rejected_home_is_told_and_the_order_underway_is_known(graph):
         client.wait_for(lambda: bool(client.orders), 'calibration')
         assert client.underway is None
         assert graph.call_calibration().success
-        with pytest.raises(GraphRefusedError, match='home: busy: '):
+        with pytest.raises(GraphError, match='home: busy: '):
             client.home(5.0)
         assert client.underway.order == 'calibrate'
         graph.command('pause')
         client.wait_for(lambda: client.underway is None, 'the end')
-        with pytest.raises(GraphRefusedError, match="'home' is not possible in PAUSED"):
+        with pytest.raises(GraphError, match="'home' is not possible in PAUSED"):
             client.home(5.0)
 
 
@@ -147,7 +147,7 @@ def test_an_order_to_move_is_not_given_again_after_what_ended_motion(
     graph.command('pause')
     with Unheard(graph, lambda: graph.command(happens)) as asker:
         asker.wait_for(lambda: asker.state == 'PAUSED', 'the pause')
-        with pytest.raises(GraphRefusedError, match=said):
+        with pytest.raises(GraphError, match=said):
             asker.ask_and_see('resume', 5.0, lambda: withdrawn and bool(asker.given))
         assert asker.given == ['resume']
 

@@ -19,7 +19,7 @@ from sensor_msgs.msg import JointState
 from endoscope_bags import BagWriter, open_bag
 from endoscope_bags.cdr_encoding import encode_joint_state
 from endoscope_bags.copying import recover
-from endoscope_bags.errors import TruncatedBagError
+from endoscope_bags.errors import CorruptBagError
 from endoscope_bags.information import bag_information
 from endoscope_benchmarks.private_domain import private_domain
 from endoscope_nodes.runtime.qos import EVENT, SENSOR_OFFERED
@@ -110,7 +110,7 @@ def test_a_killed_recorder_leaves_all_but_the_last_second(tmp_path):
         recorder.end(signal.SIGKILL)
     file = tmp_path / 'bag' / 'bag_0.mcap'
     before = file.read_bytes()
-    with pytest.raises(TruncatedBagError, match=r'bag_0\.mcap: ends in the middle'):
+    with pytest.raises(CorruptBagError, match=r'bag_0\.mcap: ends in the middle'):
         open_bag(tmp_path / 'bag')
     assert open_bag(tmp_path / 'bag', salvage=True).message_count > 0
     report = recover(tmp_path / 'bag', tmp_path / 'saved')

@@ -11,12 +11,11 @@ from pathlib import Path
 
 from mcap.records import Channel, Schema
 
-from endoscope_bags.errors import BagFullError, BagWriteError
+from endoscope_bags.errors import BagWriteError
 from endoscope_bags.mcap_file import ChunkMessage, McapFile, encode_chunk
 from endoscope_bags.message_types import MessageType
 from endoscope_bags.topic import QosProfile, qos_as_yaml
 
-_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 _NOT_OFFERED = {errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL}
 LIBRARY = 'endoscope_bags'
 # What the index of a chunk, and the two descriptions of a topic, take at the end of the file.
@@ -27,7 +26,7 @@ _CHUNKS_IN_FLIGHT = 16
 
 
 def require_room(descriptor: int, name: str, n_bytes: int) -> None:
-    """Raise BagFullError unless a file, positioned at its end, can grow by `n_bytes`."""
+    """Raise BagWriteError unless a file, positioned at its end, can grow by `n_bytes`."""
     end = os.lseek(descriptor, 0, os.SEEK_CUR)
     try:
         # Given back at once: this alone asks the disk, the quota and the limit of file sizes
@@ -42,9 +41,8 @@ def require_room(descriptor: int, name: str, n_bytes: int) -> None:
 
 
 def write_error(error: OSError, name: str) -> BagWriteError:
-    """Return what to raise for an error of the file `name`; a full disk has its own class."""
-    kind = BagFullError if error.errno in _FULL else BagWriteError
-    return kind(f'{name}: {error.strerror}; recording ended there')
+    """Return what to raise for an error of the file `name`."""
+    return BagWriteError(f'{name}: {error.strerror}; recording ended there')
 
 
 @dataclass(frozen=True)

@@ -37,10 +37,6 @@ _SUFFIXED = re.compile(r'(?P<name>.+?)[\s_](?P<unit>[A-Za-zµμ°/]+)')
 Array = NDArray[np.float64]
 
 
-class TableError(BagError, ValueError):
-    """A text table that cannot be converted; the message names the file, the line, the column."""
-
-
 @dataclass(frozen=True)
 class Heading:
     """What stands above a column."""
@@ -73,17 +69,17 @@ class DelimitedText:
                 k for k, each in enumerate(self.headings) if getattr(each, key).casefold() == wanted
             ]
             if len(found) > 1:
-                raise TableError(
+                raise BagError(
                     f'{self.path}: {len(found)} columns are named {which!r}: give the number'
                 )
             if found:
                 return found[0]
         titles = [each.title for each in self.headings if each.title]
         if not titles:
-            raise TableError(
+            raise BagError(
                 f'{self.path}: column {which!r}: the table names no columns: give the number'
             )
-        raise TableError(f'{self.path}: no column is named {which!r}: {nearest(which, titles)}')
+        raise BagError(f'{self.path}: no column is named {which!r}: {nearest(which, titles)}')
 
     def label(self, index: int) -> str:
         """Return what to call a column in a message: number and title."""
@@ -100,7 +96,7 @@ class DelimitedText:
                 for row, line in zip(self.rows, self.lines, strict=True)
                 if len(row) <= index
             )
-            raise TableError(
+            raise BagError(
                 f'{self.path}: line {line} has {len(short)} columns, {index + 1} are needed'
             ) from None
 
@@ -116,7 +112,7 @@ class DelimitedText:
                 for line, cell in zip(self.lines, cells, strict=True)
                 if not is_number(cell, self.decimal_comma) and cell
             )
-            raise TableError(
+            raise BagError(
                 f'{self.path}: line {line}, {self.label(index)}: {_shown(cell)} is not a number'
             ) from None
 
@@ -136,11 +132,11 @@ class DelimitedText:
                 float(text)
                 scaled = Decimal(text) * unit_ns
             except (InvalidOperation, ValueError) as error:
-                raise TableError(f'{where}: {_shown(cell)} is not a number') from error
+                raise BagError(f'{where}: {_shown(cell)} is not a number') from error
             if not scaled.is_finite():
-                raise TableError(f'{where}: the time {_shown(cell)} is not finite')
+                raise BagError(f'{where}: the time {_shown(cell)} is not finite')
             if abs(scaled) >= 1 << 62:
-                raise TableError(f'{where}: time {_shown(cell)}: no stamp reaches it')
+                raise BagError(f'{where}: time {_shown(cell)}: no stamp reaches it')
             times.append(round(scaled))
         return np.array(times, dtype=np.int64)
 
@@ -151,7 +147,7 @@ class DelimitedText:
             try:
                 times.append(date_ns(cell))
             except ValueError as error:
-                raise TableError(
+                raise BagError(
                     f'{self.path}: line {line}, {self.label(index)}: {_shown(cell)} is not a date '
                     'and time such as 2026-01-31 13:45:00.250'
                 ) from error
@@ -219,7 +215,7 @@ def read_table(
         ),
     )
     if not numbers:
-        raise TableError(f'{path}: fewer than two rows')
+        raise BagError(f'{path}: fewer than two rows')
     if separator is None:
         sample = [lines[number - 1] for number in numbers[:_SAMPLE]]
         separator = min(SEPARATORS, key=lambda each: _badness(sample, each))
@@ -230,7 +226,7 @@ def read_table(
         )
     first = 0 if header_lines is not None else _first_row(cells, decimal_comma)
     if len(cells) - first < 2:
-        raise TableError(f'{path}: fewer than two rows')
+        raise BagError(f'{path}: fewer than two rows')
     begin = numbers[first]
     width = len(cells[first])
     titles = _title_rows(path, lines[: begin - 1], separator, width)
@@ -247,12 +243,12 @@ def read_table(
 def _lines(path: Path) -> list[str]:
     try:
         if path.stat().st_size > LARGEST:
-            raise TableError(f'{path} is larger than {LARGEST >> 30} GiB: cut it into parts')
+            raise BagError(f'{path} is larger than {LARGEST >> 30} GiB: cut it into parts')
         content = path.read_bytes()
         wide = content.startswith((b'\xff\xfe', b'\xfe\xff'))
         text = content.decode('utf-16' if wide else 'utf-8-sig')
     except (OSError, UnicodeDecodeError) as error:
-        raise TableError(f'{path} cannot be read: {error}') from error
+        raise BagError(f'{path} cannot be read: {error}') from error
     return re.split('\r\n|\n|\r', text)
 
 
@@ -311,7 +307,7 @@ class _Rows(Sequence[list[str]]):
         try:
             return _cut(self.lines[number - 1], self.separator)
         except (csv.Error, ValueError) as error:
-            raise TableError(f'{self.path}: line {number}: {error}') from error
+            raise BagError(f'{self.path}: line {number}: {error}') from error
 
 
 def _first_row(cells: Sequence[Sequence[str]], decimal_comma: bool) -> int:

@@ -15,7 +15,7 @@ from endoscope_bags.cdr_decoding import (
     joint_state_layout,
     pose_layout,
 )
-from endoscope_bags.errors import MalformedMessageError, MissingJointError, NonFiniteError
+from endoscope_bags.errors import BagError, MalformedMessageError
 
 MOST_JOINTS = 1024
 """Names on a topic; an instrument has ten, a robot a hundred."""
@@ -85,12 +85,12 @@ class JointStateSeries:
 
         Raises
         ------
-        MissingJointError
+        BagError
             A joint is not in the recording.
         """
         missing = [name for name in names if name not in self.names]
         if missing:
-            raise MissingJointError(
+            raise BagError(
                 f'topic {self.topic} has no joint {", ".join(missing)}; '
                 f'it has {", ".join(self.names) or "none"}'
             )
@@ -108,12 +108,12 @@ class JointStateSeries:
 
         Raises
         ------
-        MissingJointError
+        BagError
             No message has the quantity.
         """
         values: FloatArray | None = getattr(self, quantity)
         if values is None:
-            raise MissingJointError(f'topic {self.topic} has no {quantity}')
+            raise BagError(f'topic {self.topic} has no {quantity}')
         return values
 
     def check_finite(self, quantities: Sequence[str] = QUANTITIES) -> None:
@@ -121,7 +121,7 @@ class JointStateSeries:
 
         Raises
         ------
-        NonFiniteError
+        BagError
             Names topic, quantity, joint and how many messages are affected.
         """
         for quantity in quantities:
@@ -130,7 +130,7 @@ class JointStateSeries:
                 continue
             bad = ~np.isfinite(values)
             row, column = np.argwhere(bad)[0]
-            raise NonFiniteError(
+            raise BagError(
                 f'topic {self.topic}: {quantity} of {self.names[column]} is {values[row, column]} '
                 f'at {self.seconds()[row]:.6f} s; {int(bad.any(axis=1).sum())} of {len(self)} '
                 'messages have values that are missing or not finite'

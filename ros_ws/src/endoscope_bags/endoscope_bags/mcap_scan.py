@@ -19,12 +19,7 @@ from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 from mcap.records import Channel, DataEnd, Footer, Header, Metadata, Schema, Statistics
 
-from endoscope_bags.errors import (
-    BagNotFoundError,
-    CorruptBagError,
-    NotABagError,
-    TruncatedBagError,
-)
+from endoscope_bags.errors import BagNotFoundError, CorruptBagError, NotABagError
 from endoscope_bags.mcap_records import (
     MAGIC,
     MESSAGE_HEAD,
@@ -166,7 +161,7 @@ class _Pass:
         position = len(MAGIC)
         whole_head = self._data[:position] == MAGIC
         if not whole_head:
-            self._damaged(CorruptBagError, 'the first bytes are not those of an MCAP recording')
+            self._damaged('the first bytes are not those of an MCAP recording')
         before, ended = position, False
         while not ended:
             record = self._record(position)
@@ -178,12 +173,12 @@ class _Pass:
                 if found < position and self._loose and self._loose[-1] == before:
                     self._loose.pop()
                 self._end_loose_messages(min(found, position))
-                self._damaged(CorruptBagError, f'no records at byte {position}, up to {found}')
+                self._damaged(f'no records at byte {position}, up to {found}')
                 before = position = found
                 continue
             opcode, start, stop = record
             if opcode == Opcode.MESSAGE and self._chunked:
-                self._damaged(CorruptBagError, f'a message by itself at byte {start}')
+                self._damaged(f'a message by itself at byte {start}')
             elif opcode == Opcode.MESSAGE and stop - start >= MESSAGE_HEAD_LENGTH:
                 self._loose.append(position)
             else:
@@ -249,15 +244,15 @@ class _Pass:
 
     def _truncated(self, position: int) -> None:
         self.scan.truncated = True
-        self._damaged(
-            TruncatedBagError,
-            f'ends in the middle, after {position} sound bytes of {len(self._data)}',
-        )
+        self._note(f'ends in the middle, after {position} sound bytes of {len(self._data)}')
 
-    def _damaged(self, kind: type[TruncatedBagError | CorruptBagError], what: str) -> None:
+    def _damaged(self, what: str) -> None:
+        self._corrupt = True
+        self._note(what)
+
+    def _note(self, what: str) -> None:
         if not self._salvage:
-            raise kind(f'{self.scan.path}: {what}; try `endoscope bag recover`')
-        self._corrupt = self._corrupt or kind is CorruptBagError
+            raise CorruptBagError(f'{self.scan.path}: {what}; try `endoscope bag recover`')
         if len(self.scan.damage) < _MOST_DAMAGE:
             self.scan.damage.append(what)
         elif len(self.scan.damage) == _MOST_DAMAGE:
@@ -268,7 +263,7 @@ class _Pass:
             if opcode == Opcode.CHUNK:
                 self._chunk(start, stop)
             elif opcode == Opcode.MESSAGE:
-                self._damaged(CorruptBagError, f'message record at byte {start} is too short')
+                self._damaged(f'message record at byte {start} is too short')
             elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                 described = self._written if self._data_end is None else self._summary
                 described.add(opcode, self._data[start:stop])
@@ -289,8 +284,7 @@ class _Pass:
         except (EndOfFile, struct.error, ValueError) as error:
             name = Opcode(opcode).name.lower()
             self._damaged(
-                CorruptBagError,
-                f'{name} record at byte {start} does not decode: {str(error) or "it is too short"}',
+                f'{name} record at byte {start} does not decode: {str(error) or "it is too short"}'
             )
 
     def _checksum(self, begin: int, end: int) -> int:
@@ -302,20 +296,20 @@ class _Pass:
     def _check_data(self, start: int, stop: int) -> None:
         expected = DataEnd.read(ExactStream(self._data[start:stop])).data_section_crc
         if expected not in (0, self._checksum(0, start - RECORD_HEAD.size)):
-            self._damaged(CorruptBagError, 'the data do not agree with their checksum')
+            self._damaged('the data do not agree with their checksum')
 
     def _check_summary(self, start: int, stop: int) -> None:
         footer = Footer.read(ExactStream(self._data[start:stop]))
         if self._data_end is None:
-            self._damaged(CorruptBagError, 'the record that ends the data is missing')
+            self._damaged('the record that ends the data is missing')
             return
         begin = self._data_end
         if footer.summary_start not in (0, begin):
-            self._damaged(CorruptBagError, 'the footer does not point to the summary')
+            self._damaged('the footer does not point to the summary')
         elif footer.summary_crc:
             self._summary_holds = self._checksum(begin, start + 16) == footer.summary_crc
             if not self._summary_holds:
-                self._damaged(CorruptBagError, 'the summary does not agree with its checksum')
+                self._damaged('the summary does not agree with its checksum')
 
     def _settle(self) -> None:
         """Put together what data and summary say; where they differ, by which checksum holds."""
@@ -324,27 +318,23 @@ class _Pass:
             told, again = getattr(written, kind), getattr(summary, kind)
             for number in told.keys() & again.keys():
                 if told[number] != again[number]:
-                    self._damaged(
-                        CorruptBagError, f'{kind[:-1]} {number} is another in the summary'
-                    )
+                    self._damaged(f'{kind[:-1]} {number} is another in the summary')
         first, second = (written, summary) if self._summary_holds else (summary, written)
         self.scan.schemas = first.schemas | second.schemas
         self.scan.channels = first.channels | second.channels
         vouched = self._summary_holds or self.scan.channels.keys() <= self._in_chunks
         if self._corrupt and not vouched:
-            self._damaged(CorruptBagError, UNSURE_NAMES)
+            self._damaged(UNSURE_NAMES)
         messages = self._table()
         counted = self._statistics.message_count if self._statistics else len(messages)
         if counted != len(messages):
-            self._damaged(
-                CorruptBagError, f'{len(messages)} messages where its summary counts {counted}'
-            )
+            self._damaged(f'{len(messages)} messages where its summary counts {counted}')
         known = np.isin(messages.channel, list(self.scan.channels))
         # A time beyond 2**63 ns (the year 2262) became negative.
         timely = (messages.log_ns >= 0) & (messages.publish_ns >= 0)
         for sound, what in ((known, 'of no channel'), (timely, 'of impossible times')):
             if not sound.all():
-                self._damaged(CorruptBagError, f'{int((~sound).sum())} messages {what}')
+                self._damaged(f'{int((~sound).sum())} messages {what}')
         self.scan.messages = messages.only(known & timely)
 
     def _chunk(self, start: int, stop: int) -> None:
@@ -355,9 +345,7 @@ class _Pass:
             records = unpacked(self._data[start:stop], self._allowance)
             positions = self._message_positions(records)
         except ChunkError as error:
-            self._damaged(
-                CorruptBagError, f'chunk {self._n_chunks} at byte {start} is damaged: {error}'
-            )
+            self._damaged(f'chunk {self._n_chunks} at byte {start} is damaged: {error}')
             return
         self._add_block(records, positions, (start, stop, True))
 
@@ -388,7 +376,7 @@ class _Pass:
         except (ChunkError, EndOfFile, struct.error, ValueError) as error:
             if not self._salvage:
                 raise ChunkError(str(error) or 'a record in it is too short') from error
-            self._damaged(CorruptBagError, f'a chunk is sound for {position} bytes only: {error}')
+            self._damaged(f'a chunk is sound for {position} bytes only: {error}')
         return positions
 
     def _end_loose_messages(self, stop: int) -> None:

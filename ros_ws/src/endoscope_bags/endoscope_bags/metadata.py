@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-from endoscope_bags.errors import BagNotFoundError, NotABagError, UnsupportedBagError
+from endoscope_bags.errors import BagError, BagNotFoundError, NotABagError
 from endoscope_bags.message_types import MessageType
 from endoscope_bags.topic import QosProfile
 from endoscope_core.atomic_output import write_text
@@ -59,7 +59,7 @@ def _listed_files(path: Path) -> list[str]:
     storage = information.get('storage_identifier')
     compression = information.get('compression_mode') or 'none'
     if storage not in ('mcap', 'sqlite3') or str(compression).lower() != 'none':
-        raise UnsupportedBagError(
+        raise BagError(
             f'{path}: storage {storage}, compression mode {compression}: only mcap and sqlite3 '
             'without compression of whole files or messages are read; convert it where it was '
             'recorded (ros2 bag convert)'

@@ -11,13 +11,11 @@ from rosbags.serde import SerdeError
 
 from endoscope_bags.cdr_decoding import HEAD_WITH_STAMP, QUANTITIES, Payloads, stamps_of_heads
 from endoscope_bags.errors import (
-    AmbiguousTopicError,
     BagError,
     CorruptBagError,
     EmptyBagError,
     MalformedMessageError,
     MissingTopicError,
-    TopicTypeError,
     UnknownTypeError,
 )
 from endoscope_bags.joint_state_series import (
@@ -118,7 +116,7 @@ class Recording:
             before = self.topics.get(channel.topic)
             kind = schema.name if schema else ''
             if before and before.type != kind:
-                raise TopicTypeError(
+                raise BagError(
                     f'{scan.path}: topic {channel.topic} is both {before.type} and {kind}'
                 )
             try:
@@ -178,14 +176,14 @@ class Recording:
         ------
         MissingTopicError
             No topic with messages has this name.
-        AmbiguousTopicError
+        BagError
             Topics under several namespaces have it.
         """
         matches = self._matches(suffix, namespace)
         if not matches:
             raise MissingTopicError(self.lacking(suffix, namespace=namespace))
         if len(matches) > 1:
-            raise AmbiguousTopicError(
+            raise BagError(
                 f'{self.path}: {suffix} could be {" or ".join(matches)}; give the namespace'
             )
         return matches[0]
@@ -237,14 +235,12 @@ class Recording:
 
         Raises
         ------
-        MissingTopicError, AmbiguousTopicError
-            See `find`.
-        TopicTypeError
-            The topic is no JointState.
+        MissingTopicError
+            No topic with messages has this name.
         MalformedMessageError
             A message does not decode.
-        NonFiniteError
-            A number is NaN or infinite.
+        BagError
+            Several topics have this name, it is not a JointState, or a number is NaN or infinite.
         """
         if order not in ('stamp', 'recorded'):
             raise ValueError(f"order is 'stamp' or 'recorded', not {order!r}")
@@ -265,7 +261,7 @@ class Recording:
     def _typed(self, suffix: str, namespace: str | None, kind: str) -> str:
         topic = self.find(suffix, namespace)
         if self.topics[topic].type != kind:
-            raise TopicTypeError(
+            raise BagError(
                 f'{self.path}: topic {topic} is {self.topics[topic].type or "untyped"}, not {kind}'
             )
         return topic
@@ -412,9 +408,9 @@ def open_bag(path: str | Path, *, salvage: bool = False) -> Recording:
 
     Raises
     ------
-    BagNotFoundError, NotABagError, EmptyBagError, TruncatedBagError, CorruptBagError,
-    UnsupportedBagError
-        All of them `BagError`; the message names the file and what to do.
+    BagNotFoundError, NotABagError, EmptyBagError, CorruptBagError, BagError
+        All of them are a `BagError`, which itself is raised for formats that are not read; the
+        message names the file and what to do.
     """
     path = Path(path)
     scans: list[Scan] = [

@@ -14,13 +14,7 @@ from pathlib import Path
 import numpy as np
 from mcap.records import Channel, Header, Schema
 
-from endoscope_bags.errors import (
-    BagNotFoundError,
-    CorruptBagError,
-    NotABagError,
-    TruncatedBagError,
-    UnknownTypeError,
-)
+from endoscope_bags.errors import BagNotFoundError, CorruptBagError, NotABagError, UnknownTypeError
 from endoscope_bags.mcap_scan import IntArray, Messages
 from endoscope_bags.message_types import message_type
 from endoscope_bags.unpacking import LARGEST_CHUNK
@@ -114,7 +108,7 @@ def _check_length(path: Path, head: bytes) -> None:
     declared = (page if page > 1 else 1 << 16) * int.from_bytes(head[28:32])
     size = path.stat().st_size
     if len(head) < _HEAD or size < declared:
-        raise TruncatedBagError(
+        raise CorruptBagError(
             f'{path}: ends in the middle ({size} of {declared} bytes): copy it again; of an '
             'sqlite3 recording that was cut nothing can be saved'
         )

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from endoscope_bags.bag_writer import BagWriter, MessageStream
 from endoscope_bags.cdr_encoding import encode_joint_states
-from endoscope_bags.delimited_text import DelimitedText, TableError, is_date, is_number, read_table
-from endoscope_bags.errors import NonFiniteError
+from endoscope_bags.delimited_text import DelimitedText, is_date, is_number, read_table
+from endoscope_bags.errors import BagError
 from endoscope_bags.message_types import JOINT_STATE
 from endoscope_bags.table_mapping import DATE, TIME_UNITS, UNITS, Column, TableMapping
 
@@ -119,7 +119,7 @@ def _times(text: DelimitedText, column: Column, start_s: float) -> Stamps:
     if unit is None:
         unit = DATE if is_date(cells[0]) and not is_number(cells[0], text.decimal_comma) else 's'
     if unit not in TIME_UNITS:
-        raise TableError(
+        raise BagError(
             f'{text.path}: {text.label(index)} is in {unit}, which is not a unit of time'
         )
     start = round(start_s * 1e9)
@@ -128,7 +128,7 @@ def _times(text: DelimitedText, column: Column, start_s: float) -> Stamps:
     in_ns = Decimal(repr(UNITS[unit])) * 10**9
     offset = round(Decimal(repr(column.offset)) * in_ns) + start
     if abs(offset) >= _LATEST:
-        raise TableError(f'{text.path}: offset or start_s: no stamp reaches it')
+        raise BagError(f'{text.path}: offset or start_s: no stamp reaches it')
     times = text.nanoseconds(index, in_ns * Decimal(repr(column.scale)))
     return times + offset
 
@@ -155,14 +155,14 @@ def _values(
         values[quantity] = np.stack(read, axis=1)
     sampled: Mask = ~np.all(absent, axis=0)
     if not sampled.any():
-        raise TableError(f'{text.path}: {topic} has no number in any row')
+        raise BagError(f'{text.path}: {topic} has no number in any row')
     bad = np.any(unusable, axis=0) & sampled
     if not bad.any():
         return values, sampled
     if drop:
         incomplete[topic] = int(bad.sum())
         if not (sampled & ~bad).any():
-            raise TableError(f'{text.path}: {topic} has no row with all its numbers')
+            raise BagError(f'{text.path}: {topic} has no row with all its numbers')
         return values, sampled & ~bad
     row = int(np.argmax(bad))
     hint = (
@@ -171,9 +171,9 @@ def _values(
     )
     where = f'{text.path}: line {text.lines[row]}'
     if np.any(absent, axis=0)[row]:
-        raise TableError(f'{where}: only a part of {topic} has a number there; {hint}')
+        raise BagError(f'{where}: only a part of {topic} has a number there; {hint}')
     quantity = next(q for q, array in values.items() if not np.isfinite(array[row]).all())
-    raise NonFiniteError(f'{where}: {quantity} of {topic} is not finite; {hint}')
+    raise BagError(f'{where}: {quantity} of {topic} is not finite; {hint}')
 
 
 def _si(text: DelimitedText, column: Column) -> tuple[Array, Mask]:
@@ -189,7 +189,7 @@ def _between_times(table: Path, time: Stamps) -> Stamps:
     """Times of rows that lie evenly between the time that they share and the next one."""
     first = np.flatnonzero(np.r_[True, np.diff(time) > 0])
     if len(first) < 2:
-        raise TableError(f'{table}: all rows have the same time: where a row lies is not known')
+        raise BagError(f'{table}: all rows have the same time: where a row lies is not known')
     rows = np.diff(np.r_[first, len(time)])
     steps = np.diff(time[first]) / rows[:-1]
     steps = np.r_[steps, steps[-1]]
@@ -199,15 +199,15 @@ def _between_times(table: Path, time: Stamps) -> Stamps:
 
 def _check(text: DelimitedText, time: Stamps) -> None:
     if np.abs(time).max() >= _LATEST:
-        raise TableError(f'{text.path}: time reaches {np.abs(time).max() * 1e-9:g} s: no stamp can')
+        raise BagError(f'{text.path}: time reaches {np.abs(time).max() * 1e-9:g} s: no stamp can')
     if time[0] < 0:
-        raise TableError(
+        raise BagError(
             f'{text.path}: time begins at {time[0] * 1e-9:g} s: set start_s in the mapping'
         )
     backward = np.flatnonzero(np.diff(time) < 0)
     if len(backward):
         row = int(backward[0])
-        raise TableError(
+        raise BagError(
             f'{text.path}: line {text.lines[row + 1]}: time runs backwards, from '
             f'{time[row] * 1e-9:g} to {time[row + 1] * 1e-9:g} s'
         )

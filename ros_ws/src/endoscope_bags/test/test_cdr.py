@@ -14,7 +14,7 @@ from endoscope_bags.cdr_encoding import (
     encode_poses,
     encode_string,
 )
-from endoscope_bags.errors import MalformedMessageError, NonFiniteError
+from endoscope_bags.errors import BagError, MalformedMessageError
 from endoscope_bags.joint_state_series import decode_joint_states, decode_poses
 from endoscope_bags.message_types import (
     CLOCK,
@@ -195,6 +195,6 @@ def test_nan_is_named_with_topic_joint_and_time():
     values = [[0.0, 0.0], [0.0, np.nan], [0.0, np.inf]]
     series = decoded(encode_joint_states(['a', 'b'], [0, 10**9, 2 * 10**9], position=values))
     expected = r'/topic: position of b is nan at 1\.000000 s; 2 of 3 messages'
-    with pytest.raises(NonFiniteError, match=expected):
+    with pytest.raises(BagError, match=expected):
         series.check_finite()
     series.check_finite(['velocity'])

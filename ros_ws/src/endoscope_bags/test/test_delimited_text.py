@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from endoscope_bags import open_bag
-from endoscope_bags.delimited_text import TableError, date_ns, read_table
-from endoscope_bags.errors import NonFiniteError
+from endoscope_bags.delimited_text import date_ns, read_table
+from endoscope_bags.errors import BagError
 from endoscope_bags.mapping_proposal import propose_mapping
 from endoscope_bags.table_mapping import EXAMPLE, TableMapping, load_table_mapping
 from endoscope_bags.text_table import convert_table
@@ -150,17 +150,17 @@ topics: {a/q: {position: {q: {column: q}}}, a/f: {effort: {f: {column: f}}}}
 @pytest.mark.parametrize(
     ('text', 'error', 'message'),
     [
-        ('t,q\n0,1\n1,x\n', TableError, "line 3, column 2 (q): 'x' is not a number"),
-        ('# a\nt,q\n0,1\n\n1\n', TableError, 'line 5 has 1 columns, 2 are needed'),
-        ('t,q\n0,1\nsoon,2\n', TableError, "line 3, column 1 (t): 'soon' is not a number"),
-        ('t,q\n0,1\nnan,2\n', TableError, "line 3, column 1 (t): the time 'nan' is not finite"),
-        ('t,q\n0,1\n1e30,2\n', TableError, 'no stamp reaches it'),
-        ('t,q\n0,1\n1,inf\n', NonFiniteError, 'line 3: position of a/b is not finite'),
-        ('t,angle\n0,1\n1,2\n', TableError, "no column is named 'q': "),
-        ('t,q,q\n0,1,1\n1,2,2\n', TableError, "2 columns are named 'q': give the number"),
-        ('0,1\n1,2\n', TableError, 'the table names no columns: give the number'),
-        ('t,q\n', TableError, 'fewer than two rows'),
-        ('t,q\n-1,1\n0,2\n', TableError, 'set start_s'),
+        ('t,q\n0,1\n1,x\n', BagError, "line 3, column 2 (q): 'x' is not a number"),
+        ('# a\nt,q\n0,1\n\n1\n', BagError, 'line 5 has 1 columns, 2 are needed'),
+        ('t,q\n0,1\nsoon,2\n', BagError, "line 3, column 1 (t): 'soon' is not a number"),
+        ('t,q\n0,1\nnan,2\n', BagError, "line 3, column 1 (t): the time 'nan' is not finite"),
+        ('t,q\n0,1\n1e30,2\n', BagError, 'no stamp reaches it'),
+        ('t,q\n0,1\n1,inf\n', BagError, 'line 3: position of a/b is not finite'),
+        ('t,angle\n0,1\n1,2\n', BagError, "no column is named 'q': "),
+        ('t,q,q\n0,1,1\n1,2,2\n', BagError, "2 columns are named 'q': give the number"),
+        ('0,1\n1,2\n', BagError, 'the table names no columns: give the number'),
+        ('t,q\n', BagError, 'fewer than two rows'),
+        ('t,q\n-1,1\n0,2\n', BagError, 'set start_s'),
     ],
 )
 def test_what_cannot_be_read_is_one_line_with_its_place(tmp_path, text, error, message):
@@ -174,7 +174,7 @@ def test_what_cannot_be_read_is_one_line_with_its_place(tmp_path, text, error, m
 def test_a_date_that_is_none_is_named(tmp_path):
     mapping = 'time: {column: t, unit: date}\ntopics: {a/b: {position: {q: {column: q}}}}'
     with pytest.raises(
-        TableError, match=re.escape("line 3, column 1 (t): '31.1.2026' is not a date")
+        BagError, match=re.escape("line 3, column 1 (t): '31.1.2026' is not a date")
     ):
         mapped(tmp_path, 't,q\n2026-01-31 10:00:00,1\n31.1.2026,2\n', mapping)
 

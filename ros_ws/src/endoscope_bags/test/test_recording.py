@@ -15,18 +15,12 @@ from endoscope_bags.cdr_encoding import (
     serialise,
 )
 from endoscope_bags.errors import (
-    AmbiguousTopicError,
     BagNotFoundError,
     CorruptBagError,
     EmptyBagError,
     MalformedMessageError,
-    MissingJointError,
     MissingTopicError,
-    NonFiniteError,
     NotABagError,
-    TopicTypeError,
-    TruncatedBagError,
-    UnsupportedBagError,
 )
 from endoscope_bags.message_types import (
     DIAGNOSTIC_ARRAY,
@@ -81,7 +75,7 @@ def test_two_namespaces_have_to_be_told_apart(tmp_path):
         for k, topic in enumerate(('/a/wires/measured_js', '/b/wires/measured_js')):
             writer.write_raw(topic, JOINT_STATE, encode_joint_state(['w'], k, effort=[k]), k)
     bag = open_bag(tmp_path / 'bag')
-    with pytest.raises(AmbiguousTopicError, match='/a/wires/measured_js or /b/wires/measured_js'):
+    with pytest.raises(BagError, match='/a/wires/measured_js or /b/wires/measured_js'):
         bag.joint_state('wires/measured_js')
     for namespace in ('/b', 'b'):
         found = bag.joint_state('wires/measured_js', namespace=namespace)
@@ -112,23 +106,23 @@ def test_joints_that_change_places_in_the_middle(tmp_path):
 
 def test_a_joint_that_is_not_there_is_named(tmp_path):
     series = open_bag(write(tmp_path / 'bag', n=1)).joint_state('motor/measured_js')
-    with pytest.raises(MissingJointError, match='no joint motor_z; it has motor_y, motor_x'):
+    with pytest.raises(BagError, match='no joint motor_z; it has motor_y, motor_x'):
         series.select(['motor_z', 'motor_x'])
-    with pytest.raises(MissingJointError, match='has no velocity'):
+    with pytest.raises(BagError, match='has no velocity'):
         series.require('velocity')
 
 
 def test_nan_is_refused_where_it_matters(tmp_path):
     data = encode_joint_state(['a'], 5 * MS, position=[np.nan], effort=[1.0])
     bag = open_bag(write(tmp_path / 'bag', n=1, data=data))
-    with pytest.raises(NonFiniteError, match='position of a is nan'):
+    with pytest.raises(BagError, match='position of a is nan'):
         bag.joint_state('motor/measured_js')
     assert bag.joint_state('motor/measured_js', finite=('effort',)).effort.tolist() == [[1.0]]
 
 
 def test_another_type_is_named(tmp_path):
     path = write(tmp_path / 'bag', n=1, kind=STRING, data=encode_string('x'))
-    with pytest.raises(TopicTypeError, match='is std_msgs/msg/String, not sensor_msgs/msg/JointS'):
+    with pytest.raises(BagError, match='is std_msgs/msg/String, not sensor_msgs/msg/JointS'):
         open_bag(path).joint_state('motor/measured_js')
 
 
@@ -259,10 +253,10 @@ def test_other_storages_and_missing_files_are_named(tmp_path):
     metadata = folder / 'metadata.yaml'
     good = metadata.read_text()
     metadata.write_text(good.replace('storage_identifier: mcap', 'storage_identifier: tape'))
-    with pytest.raises(UnsupportedBagError, match=r'storage tape.*ros2 bag convert'):
+    with pytest.raises(BagError, match=r'storage tape.*ros2 bag convert'):
         open_bag(folder)
     metadata.write_text(good.replace("compression_mode: ''", 'compression_mode: FILE'))
-    with pytest.raises(UnsupportedBagError, match='compression mode FILE'):
+    with pytest.raises(BagError, match='compression mode FILE'):
         open_bag(folder)
     metadata.write_text(good)
     (folder / 'bag_0.mcap').unlink()
@@ -275,7 +269,7 @@ def test_every_cut_is_noticed(tmp_path):
     cut = tmp_path / 'cut.mcap'
     for length in (8, 20, 300, len(whole) // 2, len(whole) - 9, len(whole) - 1):
         cut.write_bytes(whole[:length])
-        with pytest.raises(TruncatedBagError, match=r'ends in the middle.*endoscope bag recover'):
+        with pytest.raises(CorruptBagError, match=r'ends in the middle.*endoscope bag recover'):
             open_bag(cut)
 
 

@@ -139,11 +139,11 @@ def test_no_room_at_all_is_an_error_that_leaves_nothing(tmp_path):
     code = f"""
         import resource
         from endoscope_bags.recording_session import RecordingSession
-        from endoscope_bags.errors import BagFullError
+        from endoscope_bags.errors import BagWriteError
         resource.setrlimit(resource.RLIMIT_FSIZE, (1000, resource.RLIM_INFINITY))
         try:
             RecordingSession({str(tmp_path / 'bag')!r})
-        except BagFullError as error:
+        except BagWriteError as error:
             print(error)
     """
     done = subprocess.run(

@@ -10,7 +10,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from endoscope_bags import BagError, open_bag
 from endoscope_bags.cdr_encoding import encode_joint_state, encode_string
 from endoscope_bags.copying import recover
-from endoscope_bags.errors import CorruptBagError, EmptyBagError, NotABagError, TruncatedBagError
+from endoscope_bags.errors import CorruptBagError, EmptyBagError, NotABagError
 from endoscope_bags.information import bag_information
 from endoscope_bags.message_types import JOINT_STATE, STRING, typestore
 
@@ -123,7 +123,7 @@ def test_what_is_no_recording_is_one_line(tmp_path, statement, error, what):
 def test_a_file_that_was_cut_is_one_line(tmp_path, share):
     [path] = write(tmp_path / 'bag').glob('*.db3')
     path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
-    with pytest.raises(TruncatedBagError, match=r'bag\.db3: ends in the middle .*copy it again'):
+    with pytest.raises(CorruptBagError, match=r'bag\.db3: ends in the middle .*copy it again'):
         open_bag(tmp_path / 'bag')
 
 

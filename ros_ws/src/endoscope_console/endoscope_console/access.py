@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from endoscope_core.atomic_output import atomic_file
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import FileError
 
 Scope = MutableMapping[str, Any]
 Message = MutableMapping[str, Any]
@@ -48,10 +48,6 @@ _HEADERS = (
     # Between two requests of one connection nobody's patience runs out.
     (b'connection', b'close'),
 )
-
-
-class TokenFileError(EndoscopeError, ValueError):
-    """A file that has no two tokens, or that others can read."""
 
 
 @dataclass(frozen=True)
@@ -171,17 +167,17 @@ class Tokens:
                 part.write_text(f'{OPERATOR} {tokens.operator}\n{VIEWER} {tokens.viewer}\n')
             return tokens
         if stat.S_IMODE(path.stat().st_mode) & 0o077:
-            raise TokenFileError(f'{path}: others can read it; `chmod 600 {path}` ends that')
+            raise FileError(f'{path}: others can read it; `chmod 600 {path}` ends that')
         try:
             lines = dict(line.split() for line in path.read_text('ascii').splitlines() if line)
             tokens = cls(lines[OPERATOR], lines[VIEWER])
         except (ValueError, KeyError) as error:
-            raise TokenFileError(
+            raise FileError(
                 f"{path}: give two lines, '{OPERATOR} TOKEN' and '{VIEWER} TOKEN'"
             ) from error
         shortest = min(len(tokens.operator), len(tokens.viewer))
         if shortest < _TOKEN_BYTES or tokens.operator == tokens.viewer:
-            raise TokenFileError(f'{path}: two tokens of at least {_TOKEN_BYTES} characters')
+            raise FileError(f'{path}: two tokens of at least {_TOKEN_BYTES} characters')
         return tokens
 
     def role(self, token: str) -> str:

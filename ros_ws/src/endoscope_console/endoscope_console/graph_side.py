@@ -22,7 +22,7 @@ from endoscope_core.errors import EndoscopeError
 from endoscope_core.rig import load_rig
 from endoscope_nodes.client.calibration_result import REACH
 from endoscope_nodes.client.graph_client import GraphClient
-from endoscope_nodes.client.graph_listener import CONSOLE, GraphRefusedError, Health
+from endoscope_nodes.client.graph_listener import CONSOLE, GraphError, Health
 from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
 from endoscope_nodes.client.handle_sender import handle_senders
 from endoscope_nodes.names import CONSOLE_LOG, FINISHED
@@ -50,7 +50,7 @@ class _Client(GraphClient):
 
     def _wait(self, seconds: float) -> None:
         if self.ends.wait(min(seconds, _POLL_S)):
-            raise GraphRefusedError('the server of the page ends')
+            raise GraphError('the server of the page ends')
 
     def hear(self) -> None:
         """Take all that has come, in the one thread that may."""

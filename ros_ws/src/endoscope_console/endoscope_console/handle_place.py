@@ -10,7 +10,7 @@ from endoscope_console.beat import Beat
 from endoscope_console.graph_side import PATIENCE_S, GraphSide, Settings
 from endoscope_core.choices import FOLLOW_THE_HANDLE, PLAYS
 from endoscope_core.errors import EndoscopeError
-from endoscope_nodes.client.graph_listener import GraphRefusedError
+from endoscope_nodes.client.graph_listener import GraphError
 from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
 
 _PLACE_S = 5.0
@@ -89,7 +89,7 @@ class HandlePlace:
         source, self._found = self._found, FOLLOW_THE_HANDLE
         try:
             await self._set_source_back(source)
-        except GraphRefusedError as error:
+        except GraphError as error:
             self._graph.log(f'console.source {source}', '', '', False, str(error))
         self._graph.ask_for_settings(time.monotonic_ns())
 

@@ -40,7 +40,7 @@ from endoscope_core.choices import (
     PHYSICAL,
 )
 from endoscope_core.errors import EndoscopeError
-from endoscope_nodes.client.graph_listener import CONSOLE, GraphRefusedError
+from endoscope_nodes.client.graph_listener import CONSOLE, GraphError
 from endoscope_nodes.names import FINISHED, RECORDER_START, RECORDER_STOP
 from endoscope_nodes.runtime.node_parameters import CompensatorParameters
 
@@ -380,7 +380,7 @@ class Operations:
             try:
                 before = before | {'source': FOLLOW_THE_HANDLE}
                 await self._ask(partial(self._place.set_console, **before))
-            except GraphRefusedError as error:
+            except GraphError as error:
                 self.graph.log(f'console.source {FOLLOW_THE_HANDLE}', '', '', False, str(error))
             self.graph.ask_for_settings(time.monotonic_ns())
 

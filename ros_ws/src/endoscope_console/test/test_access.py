@@ -11,16 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from starlette.routing import Route, WebSocketRoute
 
-from endoscope_console.access import (
-    OPERATOR,
-    REPORTS,
-    VIEWER,
-    Admission,
-    Gate,
-    TokenFileError,
-    Tokens,
-)
+from endoscope_console.access import OPERATOR, REPORTS, VIEWER, Admission, Gate, Tokens
 from endoscope_console.server import Console
+from endoscope_core.errors import FileError
 
 OWN = 'http://127.0.0.1:8642'
 HOST = (b'host', b'127.0.0.1:8642')
@@ -158,7 +151,7 @@ def test_tokens_are_kept_where_this_user_alone_can_read_them(tmp_path):
     assert stat.S_IMODE(file.stat().st_mode) == 0o600
     assert Tokens.of_file(file) == tokens
     file.chmod(0o644)
-    with pytest.raises(TokenFileError, match='chmod 600'):
+    with pytest.raises(FileError, match='chmod 600'):
         Tokens.of_file(file)
 
 
@@ -169,5 +162,5 @@ def test_a_file_that_has_no_two_tokens_is_refused(tmp_path: Path, text):
     file = tmp_path / 'tokens'
     file.write_text(text)
     file.chmod(0o600)
-    with pytest.raises(TokenFileError, match='two'):
+    with pytest.raises(FileError, match='two'):
         Tokens.of_file(file)

@@ -20,7 +20,6 @@ from endoscope_core.physics import PlantDescription, simulate
 from endoscope_core.physics.family import (
     CENTRE,
     MOST_BENT,
-    FamilyError,
     Readings,
     TubeFamily,
     load_family,
@@ -83,7 +82,7 @@ def test_a_wrong_file_is_refused_by_name(tmp_path, text, named):
 
 @pytest.mark.parametrize('bend', [-0.1, MOST_BENT + 0.1])
 def test_a_tube_out_of_the_family_is_refused(bend):
-    with pytest.raises(FamilyError, match='reaches from 0 to 300 deg'):
+    with pytest.raises(InputError, match='reaches from 0 to 300 deg'):
         shipped_family().joint(bend)
 
 

@@ -15,7 +15,7 @@ from endoscope_bags import BagWriter, JointStateSeries, MessageStream, PoseSerie
 from endoscope_bags.cdr_encoding import encode_joint_states, encode_poses
 from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED
 from endoscope_bags.recording import rig_of_bag, rig_record
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import InputError
 from endoscope_core.kinematics import tip_pose
 from endoscope_core.physics import PlantDescription, SensorModel
 from endoscope_core.physics.on_stamps import (
@@ -96,10 +96,6 @@ def section_length(recorded: PoseSeries) -> float:
     return float(np.median(finite)) if finite.size else 0.0
 
 
-class NoCommandsError(EndoscopeError, ValueError):
-    """A recording without commands for any joint of the plant."""
-
-
 @dataclass(frozen=True)
 class BagCommands:
     """Commands of some joints of a plant."""
@@ -111,17 +107,17 @@ class BagCommands:
 
 
 def commands_of_bag(recording: Recording, plant: PlantDescription, rig: Rig) -> BagCommands:
-    """Shaft commands of a bag, or desired angles times the gear; NoCommandsError without either."""
+    """Shaft commands of a bag, or desired angles times the gear; InputError without either."""
     topic = input_topic(recording)
     if not topic:
-        raise NoCommandsError(recording.lacking(COMMAND, DESIRED))
+        raise InputError(recording.lacking(COMMAND, DESIRED))
     series = recording.joint_state(topic, finite=('position',))
     desired = topic == DESIRED
     names = {joint: joint if desired else motor_name(joint) for joint in plant.joints}
     require_running_stamps(recording.path, series)
     joints = tuple(joint for joint, name in names.items() if name in series.names)
     if not joints:
-        raise NoCommandsError(
+        raise InputError(
             f'{recording.path}: {series.topic} commands {", ".join(series.names) or "nothing"}, '
             f'the plant has {", ".join(names.values())}'
         )
@@ -162,7 +158,7 @@ def write_answer(
     recording; a topic that the recording lacks comes at its nominal rate. Only joints that are
     commanded answer. Where the recording has `tracker/measured_cp`, the answer has it too, at the
     stamps that it shares with `slave/measured_js`. Without a seed there is neither noise nor
-    quantisation. NoCommandsError, BagError or FileError if the recording has no usable commands,
+    quantisation. InputError, BagError or FileError if the recording has no usable commands,
     its rig cannot be read, or `out` exists.
     """
     rig = rig or rig_of_bag(recording)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_bags.errors import BagError, MissingJointError, MissingTopicError
+from endoscope_bags.errors import BagError, MissingTopicError
 from endoscope_bags.information import losses_told
 from endoscope_bags.joint_state_series import JointStateSeries
 from endoscope_bags.recording import Recording as Bag
@@ -181,10 +181,6 @@ STRAY_NS = 10_000_000_000
 """Further from its receipt than the others of its topic by this, a stamp is no delay."""
 
 
-class UnusableStampsError(BagError):
-    """The stamps of a topic say nothing about when its messages were made."""
-
-
 def without_stray(series: JointStateSeries) -> tuple[JointStateSeries, list[str]]:
     """Leave out messages stamped far from their receipt, unlike the others; and say so."""
     delay = series.log_ns - series.stamp_ns
@@ -202,9 +198,9 @@ def without_stray(series: JointStateSeries) -> tuple[JointStateSeries, list[str]
 
 
 def require_running_stamps(path: object, series: JointStateSeries) -> None:
-    """Raise UnusableStampsError where several messages of a topic all have one stamp."""
+    """Raise BagError where several messages of a topic all have one stamp."""
     if len(series) > 1 and np.ptp(series.stamp_ns) == 0:
-        raise UnusableStampsError(
+        raise BagError(
             f'{path}: all {len(series)} messages of {series.topic} are stamped '
             f'{int(series.stamp_ns[0]) * 1e-9:.3f} s: its driver must set the header'
         )
@@ -219,7 +215,7 @@ def require_common_time(path: object, topics: Sequence[JointStateSeries]) -> Non
     for one in topics[1:]:
         begin, end = int(one.stamp_ns.min()), int(one.stamp_ns.max())
         if begin > commands.stamp_ns.max() or end < origin:
-            raise UnusableStampsError(
+            raise BagError(
                 f'{path}: {one.topic} is stamped from {(begin - origin) * 1e-9:.3f} to '
                 f'{(end - origin) * 1e-9:.3f} s after the first command of {commands.topic}, the '
                 f'last of which is at {int(np.ptp(commands.stamp_ns)) * 1e-9:.3f} s: record both '
@@ -229,10 +225,6 @@ def require_common_time(path: object, topics: Sequence[JointStateSeries]) -> Non
 
 OPTIONAL = (WIRES,)
 """Those of `WAIVABLE` that many rigs do not have: nobody has to say so."""
-
-
-class TooShortError(BagError):
-    """A topic holds too few messages to be a time series."""
 
 
 def recording_from_bag(
@@ -262,7 +254,7 @@ def recording_from_bag(
     def read(topic: str, quantity: str) -> JointStateSeries:
         series = bag.joint_state(topic, namespace=namespace, order='recorded', finite=(quantity,))
         if len(series) < 2:
-            raise TooShortError(f'{path}: topic {series.topic} holds {len(series)} message')
+            raise BagError(f'{path}: topic {series.topic} holds {len(series)} message')
         series.require(quantity)
         series, left_out = without_stray(series)
         notes.extend(left_out)
@@ -297,7 +289,7 @@ def recording_from_bag(
         else:
             joints.append(joint)
     if not joints:
-        raise MissingJointError(f'{path}: no joint is complete: ' + '; '.join(notes))
+        raise BagError(f'{path}: no joint is complete: ' + '; '.join(notes))
 
     every = [s for s in (command, wires, bending, motor) if s is not None]
     require_common_time(path, every)

@@ -15,7 +15,7 @@ from endoscope_benchmarks.console_trials.chromium import BrowserError
 from endoscope_benchmarks.console_trials.hand import Hand
 from endoscope_benchmarks.console_trials.relay import Relay
 from endoscope_benchmarks.console_trials.served_console import ConsoleError, ServedConsole
-from endoscope_nodes.client.graph_listener import GraphRefusedError
+from endoscope_nodes.client.graph_listener import GraphError
 from endoscope_nodes.client.graph_parameters import set_parameters
 
 _PATIENCE_S = 300.0
@@ -110,7 +110,7 @@ def console_trial(folder: Path, domain: int) -> str:
                     return f'{client.state}: {client.why}'
                 client.home(_PATIENCE_S)
                 client.ask('disable')
-    except (BrowserError, ConsoleError, GraphRefusedError) as error:
+    except (BrowserError, ConsoleError, GraphError) as error:
         return str(error)[:600]
     return ''
 

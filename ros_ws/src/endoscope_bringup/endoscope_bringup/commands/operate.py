@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_bringup.operating.actions import act, paused_when_interrupted
     from endoscope_core.errors import printable
     from endoscope_nodes.client.graph_client import joined_graph
-    from endoscope_nodes.client.graph_listener import GraphRefusedError
+    from endoscope_nodes.client.graph_listener import GraphError
 
     name = ' '.join(filter(None, (args.action, getattr(args, 'what', ''))))
     try:
@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
         ):
             client.told = partial(print, file=sys.stderr, flush=True)
             reply = act(client, args)
-    except GraphRefusedError as error:
+    except GraphError as error:
         if args.json:
             print(json.dumps({'action': name, 'done': False, 'answer': str(error)}))
         else:

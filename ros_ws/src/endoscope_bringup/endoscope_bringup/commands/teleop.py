@@ -77,11 +77,11 @@ def run(args: argparse.Namespace) -> int:
     check_terminal()
     from endoscope_bringup.teleop.teleoperation import teleoperate
     from endoscope_nodes.client.graph_client import joined_graph
-    from endoscope_nodes.client.graph_listener import GraphRefusedError
+    from endoscope_nodes.client.graph_listener import GraphError
 
     try:
         with joined_graph('teleop', args.namespace) as client:
             return teleoperate(client, args)
-    except GraphRefusedError as error:
+    except GraphError as error:
         print(f'teleop: {error}', file=sys.stderr)
         return 1

@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
 
     from endoscope_bringup.operating.listening import echo, listing, rate
     from endoscope_nodes.client.graph_client import joined_graph
-    from endoscope_nodes.client.graph_listener import GraphRefusedError
+    from endoscope_nodes.client.graph_listener import GraphError
 
     count = 1 if args.once else args.count
     try:
@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
                 echo(client, args.echo, count, args.seconds, args.timeout, args.json)
             else:
                 listing(client, args.timeout, args.json)
-    except GraphRefusedError as error:
+    except GraphError as error:
         print(f'topics: {error}', file=sys.stderr)
         return 1
     return 0

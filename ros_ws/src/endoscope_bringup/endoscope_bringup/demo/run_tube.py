@@ -27,7 +27,7 @@ from endoscope_core.physics.family import shipped_family
 from endoscope_core.signals import calibration_sinusoid, motion_by_name
 from endoscope_nodes.client.calibration_result import REACH
 from endoscope_nodes.client.graph_client import GraphClient
-from endoscope_nodes.client.graph_listener import GraphRefusedError
+from endoscope_nodes.client.graph_listener import GraphError
 from endoscope_nodes.client.graph_parameters import set_parameters
 from endoscope_nodes.graph import CONTROL_NODES, SHOWING_NODES, SLAVE_NODES
 from endoscope_nodes.names import CALIBRATION_COMMAND, JOINTS
@@ -137,7 +137,7 @@ class _GraphSession:
         limit = time.monotonic() + PATIENCE_S
         while not (self._client.is_connected() and self._runtime.connected()):
             if time.monotonic() > limit:
-                raise GraphRefusedError('the nodes did not find each other: is multicast allowed?')
+                raise GraphError('the nodes did not find each other: is multicast allowed?')
             self._runtime.spin_until(Future(), POLL_S)
         self._advance(0.5)
         self._client.ask('enable')

@@ -15,7 +15,7 @@ from endoscope_bringup.operating.status import calibration_in_words, status_of
 from endoscope_bringup.progress_line import ShareBar
 from endoscope_nodes import names
 from endoscope_nodes.client.graph_client import GraphClient
-from endoscope_nodes.client.graph_listener import GraphRefusedError
+from endoscope_nodes.client.graph_listener import GraphError
 from endoscope_nodes.client.graph_parameters import read_parameter, read_parameters, set_parameters
 
 _OF_A_DEVICE = {
@@ -68,10 +68,10 @@ def _calibrate(client: GraphClient, patience_s: float) -> Reply:
     progress = ShareBar()
     try:
         result = client.calibrate(progress, patience_s)
-    except GraphRefusedError as error:
+    except GraphError as error:
         # An aborted calibration tells what it saw: the session ended. The supervisor knows why.
         if client.state == 'FAULT' and client.wait_until(lambda: bool(client.why), patience_s):
-            raise GraphRefusedError(f'{error} ({client.state}: {client.why})') from error
+            raise GraphError(f'{error} ({client.state}: {client.why})') from error
         raise
     finally:
         progress.end()

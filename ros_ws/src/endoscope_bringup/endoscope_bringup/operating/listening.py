@@ -16,7 +16,7 @@ from sensor_msgs.msg import JointState
 from endoscope_bags.message_types import TF_MESSAGE, typestore
 from endoscope_core.errors import nearest, printable
 from endoscope_nodes.client.graph_client import GraphClient
-from endoscope_nodes.client.graph_listener import NoGraphError
+from endoscope_nodes.client.graph_listener import GraphError
 from endoscope_nodes.names import WIRES
 from endoscope_nodes.runtime.recorded_topics import message_class, suitable_qos
 from endoscope_nodes.topics import BY_NAME, TOPICS, Topic
@@ -32,7 +32,7 @@ _UNITS = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m'}
 def listing(client: GraphClient, patience_s: float, as_json: bool) -> None:
     """Print all topics of the interface, and others of the namespace."""
     if not client.wait_until(lambda: bool(client.nodes()), patience_s):
-        raise NoGraphError(f'no graph answers in {client.where}: start one with `graph`')
+        raise GraphError(f'no graph answers in {client.where}: start one with `graph`')
     # The topics of a node become known after its name.
     client.wait_until(lambda: all(_senders(client, t.name) for t in TOPICS), _FOUND_S)
     rows = [_row(client, topic.name, topic) for topic in TOPICS]
@@ -112,10 +112,10 @@ def _messages(
     seconds: float | None,
     patience_s: float,
 ) -> Iterator[tuple[bytes, int, type]]:
-    """Bytes, time of receipt in ns and class of each message; NoGraphError where none comes."""
+    """Bytes, time of receipt in ns and class of each message; GraphError where none comes."""
     full = _full(client, name)
     if not client.wait_until(lambda: bool(_senders(client, full)), patience_s):
-        raise NoGraphError(f'nobody sends {name} in {client.where}{_hint(client, name)}')
+        raise GraphError(f'nobody sends {name} in {client.where}{_hint(client, name)}')
     kind = message_class(dict(client.node.get_topic_names_and_types())[full][0])
     publishers = client.node.get_publishers_info_by_topic(full)
     waiting: list[tuple[bytes, int]] = []
@@ -126,7 +126,7 @@ def _messages(
         qos=suitable_qos(False, publishers),
     )
     if not client.wait_until(lambda: bool(waiting), patience_s):
-        raise NoGraphError(f'{name} has senders, but has been silent for {patience_s:g} s')
+        raise GraphError(f'{name} has senders, but has been silent for {patience_s:g} s')
     end = math.inf if seconds is None else time.monotonic() + seconds
     given = 0
     while True:
@@ -168,7 +168,7 @@ def rate(
         pass
     gaps = [(b - a) * 1e-6 for a, b in pairwise(times)]
     if not gaps:
-        raise NoGraphError(f'{name}: {len(times)} message came: too few for a rate')
+        raise GraphError(f'{name}: {len(times)} message came: too few for a rate')
     mean, spread = statistics.fmean(gaps), statistics.pstdev(gaps)
     figures = {
         'messages': len(times),

@@ -18,7 +18,7 @@ from endoscope_bringup.teleop.terminal import Terminal, TerminalLostError
 from endoscope_core.choices import FOLLOW_THE_HANDLE, PLAYS
 from endoscope_core.errors import printable
 from endoscope_nodes.client.graph_client import GraphClient
-from endoscope_nodes.client.graph_listener import CONSOLE, GraphRefusedError
+from endoscope_nodes.client.graph_listener import CONSOLE, GraphError
 from endoscope_nodes.client.graph_parameters import (
     read_parameter,
     request_parameters,
@@ -87,14 +87,14 @@ def _check_consent(source: str, taken: bool) -> None:
     except EOFError:
         answer = ''
     if answer.strip().lower() not in ('y', 'yes'):
-        raise GraphRefusedError(f'console.source stays {source}: nothing would follow the keys')
+        raise GraphError(f'console.source stays {source}: nothing would follow the keys')
 
 
 def _wait_for_the_handles_place(client: GraphClient) -> None:
-    """Raise GraphRefusedError where somebody else speaks for the handle and does not go."""
+    """Raise GraphError where somebody else speaks for the handle and does not go."""
     if not client.wait_until(lambda: not handle_senders(client.node), _GONE_S):
         others = ' and '.join(handle_senders(client.node))
-        raise GraphRefusedError(
+        raise GraphError(
             f'{others} speaks for the handle already, on {MASTER_MEASURED} or {MASTER_CLUTCH}; two '
             'of them would be a fault'
         )

@@ -12,10 +12,6 @@ from numpy.typing import NDArray
 from endoscope_core.physics.layout import NOMINAL_KEYS, SLOTS
 
 
-class UnknownEffectError(ValueError):
-    """An effect, its joint or one of its parameters that the catalogue does not have."""
-
-
 class Stage(StrEnum):
     """Part of the chain from command to recording in which an effect acts."""
 

@@ -20,7 +20,7 @@ import yaml
 from msgspec import Meta
 
 from endoscope_core.atomic_output import write_text
-from endoscope_core.errors import EndoscopeError, nearest
+from endoscope_core.errors import InputError, nearest
 from endoscope_core.physics.description import NUMBERS, JointParameters
 from endoscope_core.physics.layout import NOMINAL_KEYS
 from endoscope_core.schema import Number, load
@@ -36,10 +36,6 @@ SIGNED = tuple(key for key in NOMINAL_KEYS if NUMBERS[key].low < 0.0)
 """Keys that follow their line themselves; the logarithm of every other key does."""
 _MOST_TERMS = 3
 _DIGITS = 6
-
-
-class FamilyError(EndoscopeError, ValueError):
-    """A tube outside the family."""
 
 
 @dataclass(frozen=True)
@@ -77,9 +73,9 @@ class TubeFamily:
                 raise ValueError(f'{key} is {line[0]} at the centre: it must be positive')
 
     def joint(self, bend: float) -> JointParameters:
-        """The joint of a tube bent by `bend` rad; a FamilyError outside of 0 to `MOST_BENT`."""
+        """The joint of a tube bent by `bend` rad; an InputError outside of 0 to `MOST_BENT`."""
         if not 0.0 <= bend <= MOST_BENT:
-            raise FamilyError(
+            raise InputError(
                 f'a tube bent by {math.degrees(bend):.0f} deg: the family reaches from 0 to '
                 f'{math.degrees(MOST_BENT):.0f} deg'
             )
@@ -91,7 +87,7 @@ class TubeFamily:
         try:
             return JointParameters(friction_profile=self.friction_profile, **values)
         except ValueError as error:
-            raise FamilyError(f'tube bent by {math.degrees(bend):.0f} deg: {error}') from error
+            raise InputError(f'tube bent by {math.degrees(bend):.0f} deg: {error}') from error
 
     def save(self, path: str | Path) -> None:
         """Write the family as YAML."""

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from endoscope_core.compiled import Array, Flags
-from endoscope_core.errors import nearest
+from endoscope_core.errors import InputError, nearest
 from endoscope_core.physics.description import (
     EffectSpec,
     JointParameters,
     PlantDescription,
     TermSpec,
 )
-from endoscope_core.physics.effect import NominalPhysics, UnknownEffectError
+from endoscope_core.physics.effect import NominalPhysics
 from endoscope_core.physics.effects import CATALOGUE, NOMINAL_PHYSICS, describe
 from endoscope_core.physics.functions import FUNCTIONS, describe_place
 from endoscope_core.physics.functions.evaluation import ADDS, FLAGS_OF_FUNCTIONS, MULTIPLIES
@@ -54,9 +54,7 @@ def effect_values(spec: EffectSpec) -> Array:
     names = [parameter.name for parameter in definition.parameters]
     for name in spec.parameters:
         if name not in names:
-            raise UnknownEffectError(
-                f'effect {spec.id} has no parameter {name}: {nearest(name, names)}'
-            )
+            raise InputError(f'effect {spec.id} has no parameter {name}: {nearest(name, names)}')
     values = np.array(
         [
             float(spec.parameters.get(parameter.name, parameter.typical))
@@ -80,7 +78,7 @@ def pack(plant: PlantDescription) -> tuple[Array, Flags]:
     """Parameters (J, parameters) and flags (J, flags) of a plant.
 
     The flags are of bool, or of `FLAGS_OF_FUNCTIONS` where the plant has terms. An effect or place
-    that is unknown, on an unknown joint, given twice or out of bounds is an UnknownEffectError or a
+    that is unknown, on an unknown joint, given twice or out of bounds is an InputError or a
     ValueError.
     """
     names = plant.joint_names()
@@ -92,7 +90,7 @@ def pack(plant: PlantDescription) -> tuple[Array, Flags]:
             row[effect.places] = [parameter.typical for parameter in effect.parameters]
     for spec in plant.effects:
         if spec.joint not in names:
-            raise UnknownEffectError(
+            raise InputError(
                 f'effect {spec.id} is on joint {spec.joint}: {nearest(spec.joint, names)}'
             )
         j = names.index(spec.joint)
@@ -113,7 +111,7 @@ def pack(plant: PlantDescription) -> tuple[Array, Flags]:
         flags = flags.astype(FLAGS_OF_FUNCTIONS)
     for term in plant.terms:
         if term.joint not in names:
-            raise UnknownEffectError(
+            raise InputError(
                 f'unknown_term at {term.place} is on joint {term.joint}: '
                 f'{nearest(term.joint, names)}'
             )

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from endoscope_bags import BagWriter, MessageStream
 from endoscope_bags.cdr_encoding import encode_joint_states
 from endoscope_bags.message_types import JOINT_STATE
-from endoscope_core.errors import EndoscopeError, nearest
+from endoscope_core.errors import InputError, nearest
 from endoscope_core.physics.plant_file import JOINT_NAMES
 from endoscope_explain.notebook.signals import UNITS, Array, Signal, Signals, name_of, read
 from endoscope_explain.recording import (
@@ -27,10 +27,6 @@ from endoscope_explain.recording import (
 TIME = 'time'
 LATEST_S = 2.0**31
 """Of a stamp."""
-
-
-class ArraysError(EndoscopeError, ValueError):
-    """Arrays that are not a recording, or not commands."""
 
 
 def from_arrays(
@@ -63,18 +59,18 @@ def from_arrays(
     by_topic: dict[str, dict[str, tuple[Array, Array]]] = {}
     for name, given in signals.items():
         if name not in known:
-            raise ArraysError(f'{name} is not a signal: {nearest(name, known)}')
+            raise InputError(f'{name} is not a signal: {nearest(name, known)}')
         pair = (given.time, given.values) if isinstance(given, Signal) else given
         by_topic.setdefault(known[name][0], {})[name] = _checked(name, pair)
     if not by_topic:
-        raise ArraysError(f'no signals: give some of {", ".join(known)}')
+        raise InputError(f'no signals: give some of {", ".join(known)}')
     streams = []
     for topic, among in by_topic.items():
         first, (time, _) = next(iter(among.items()))
         columns: dict[str, dict[str, Array]] = {}
         for name, (own, values) in among.items():
             if not np.array_equal(own, time):
-                raise ArraysError(f'{name}: give it the times of {first}, as both are of {topic}')
+                raise InputError(f'{name}: give it the times of {first}, as both are of {topic}')
             _, of, quantity = known[name]
             columns.setdefault(quantity, {})[of] = values
         streams.append(_stream(topic, time, columns))
@@ -86,7 +82,7 @@ def commands_from(commands: Mapping[str, ArrayLike]) -> Signals:
     angles = {name: values for name, values in commands.items() if name != TIME}
     motors = [name for name in angles if name.startswith('motor_')]
     if TIME not in commands or not angles or (motors and len(motors) < len(angles)):
-        raise ArraysError(
+        raise InputError(
             f'{", ".join(commands) or "nothing"}: give {TIME}, and angles of joints '
             '(bend_x, bend_y) or of motor shafts (motor_x, motor_y)'
         )
@@ -113,18 +109,16 @@ def _checked(name: str, pair: tuple[ArrayLike, ArrayLike]) -> tuple[Array, Array
     try:
         time, values = (np.asarray(array, dtype=np.float64) for array in pair)
     except (TypeError, ValueError) as error:
-        raise ArraysError(f'{name}: give an array of times and one of values') from error
+        raise InputError(f'{name}: give an array of times and one of values') from error
     if time.ndim != 1 or len(time) < 2 or not (np.diff(time) >= 0.0).all() or time[0] == time[-1]:
-        raise ArraysError(f'{name}: give two or more times in s that increase')
+        raise InputError(f'{name}: give two or more times in s that increase')
     if not 0.0 <= time[0] <= time[-1] < LATEST_S:
-        raise ArraysError(
-            f'{name}: times are in s from 0 or later, not {time[0]:g} to {time[-1]:g}'
-        )
+        raise InputError(f'{name}: times are in s from 0 or later, not {time[0]:g} to {time[-1]:g}')
     if values.shape != time.shape:
-        raise ArraysError(f'{name}: give {len(time)} values, one for each time, not {values.shape}')
+        raise InputError(f'{name}: give {len(time)} values, one for each time, not {values.shape}')
     wrong = np.flatnonzero(~np.isfinite(values))
     if len(wrong):
-        raise ArraysError(
+        raise InputError(
             f'{name}: {len(wrong)} of {len(values)} values are not finite, first at '
             f'{time[wrong[0]]:g} s: leave these samples out'
         )

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from endoscope_bags import open_bag
 from endoscope_core.choices import WAIVABLE
-from endoscope_core.errors import EndoscopeError, FileError, nearest
+from endoscope_core.errors import FileError, InputError, nearest
 from endoscope_core.physics import PlantDescription, load_plant, recording_faults
 from endoscope_core.physics.packing import pack
 from endoscope_core.rig import Rig, load_rig
@@ -27,10 +27,6 @@ Plant = str | Path | PlantDescription
 Bag = str | Path | Signals
 ONE = (str, Path, Mapping)
 """Is no sequence of bags; a mapping other than `Signals` is refused with a word about it."""
-
-
-class CallError(EndoscopeError, ValueError):
-    """An argument that a call cannot use."""
 
 
 def simulate(
@@ -141,16 +137,16 @@ def explain(  # type: ignore[misc]
     """
     for name, number in (('band', band), ('effects', effects), ('jobs', jobs)):
         if not number > 0:
-            raise CallError(f'{name} is {number!r}: give a number above 0')
+            raise InputError(f'{name} is {number!r}: give a number above 0')
     for topic in without:
         if topic not in WAIVABLE:
-            raise CallError(f'without {topic!r}: {nearest(topic, WAIVABLE)}')
+            raise InputError(f'without {topic!r}: {nearest(topic, WAIVABLE)}')
     bags = [bag] if isinstance(bag, ONE) else list(bag)
     seconds = (
         [validate] * len(bags) if validate is None or isinstance(validate, ONE) else list(validate)
     )
     if not bags or len(seconds) != len(bags):
-        raise CallError(
+        raise InputError(
             f'{len(bags)} recordings with {len(seconds)} in validate: give one or more, and as '
             'many in validate'
         )
@@ -197,6 +193,6 @@ def _path(bag: Bag) -> Path:
         return bag.path
     if isinstance(bag, str | Path):
         return Path(bag)
-    raise CallError(
+    raise InputError(
         f'{type(bag).__name__} is not a bag: give a path, or what read or from_arrays gave'
     )

@@ -52,10 +52,6 @@ class UnknownSignalError(EndoscopeError, KeyError):
     """A name that no signal of the recording has."""
 
 
-class NoPandasError(EndoscopeError, ImportError):
-    """A table was asked for where pandas is not installed."""
-
-
 @dataclass(frozen=True)
 class Signal:
     """One quantity of one joint, motor or wire.
@@ -140,13 +136,13 @@ class Signals(Mapping[str, Signal]):
 
         Raises
         ------
-        NoPandasError
+        EndoscopeError
             This environment has no pandas.
         """
         try:
             from pandas import DataFrame, Index
         except ImportError as error:
-            raise NoPandasError('to_frame needs pandas: pip install pandas') from error
+            raise EndoscopeError('to_frame needs pandas: pip install pandas') from error
         signals = [self[name] for name in (self if names is None else names)]
         time = np.unique(np.concatenate([signal.time for signal in signals]))
         columns = {signal.name: np.full(len(time), np.nan) for signal in signals}

@@ -17,10 +17,9 @@ from endoscope_nodes import names
 from endoscope_nodes.client.graph_listener import (
     PATIENCE_S,
     SUPERVISOR,
+    GraphError,
     GraphListener,
-    GraphRefusedError,
     Health,
-    NoGraphError,
 )
 from endoscope_nodes.client.order_feedback import CALIBRATE, HOME, OrderFeedback, OrderState
 from endoscope_nodes.runtime.environment import joined_node
@@ -59,15 +58,15 @@ class GraphClient(GraphListener):
         return self._is_heard() and all(s.count_publishers() for s, _ in self._heard)
 
     def find(self, patience_s: float) -> None:
-        """Wait until the supervisor is heard and hears; NoGraphError if nobody is there."""
+        """Wait until the supervisor is heard and hears; GraphError if nobody is there."""
         if self.wait_until(lambda: bool(self.state) and self._is_heard(), patience_s):
             return
         others = self.nodes()
         if others:
-            raise NoGraphError(
+            raise GraphError(
                 f'no supervisor answers in {self.where}; there are {", ".join(others)}'
             )
-        raise NoGraphError(f'no graph answers in {self.where}: start one with `graph`')
+        raise GraphError(f'no graph answers in {self.where}: start one with `graph`')
 
     def _is_heard(self) -> bool:
         known = self.node.get_subscriptions_info_by_topic(self._orders.topic_name)
@@ -106,7 +105,7 @@ class GraphClient(GraphListener):
         # A node's trouble may come to light at once; its cause follows.
         if state == 'ENABLED' and self.wait_until(lambda: self.state != state, _STEADY_S):
             self.wait_until(lambda: bool(self.why) or withdrawn(), patience_s)
-            raise GraphRefusedError(f'{self.state}: {self.why or "asked for meanwhile"}')
+            raise GraphError(f'{self.state}: {self.why or "asked for meanwhile"}')
         return state
 
     def _ask(
@@ -132,10 +131,10 @@ class GraphClient(GraphListener):
 
         while self._clock() <= end:
             if withdrawn():
-                raise GraphRefusedError(f'{command} was withdrawn before it was answered')
+                raise GraphError(f'{command} was withdrawn before it was answered')
             if command in _TO_MOTION and begun_in and self.state != begun_in:
                 # What has ended motion meanwhile must not be undone by an order from before it.
-                raise GraphRefusedError(f'{self.state} instead of {what}: {self.why or "no cause"}')
+                raise GraphError(f'{self.state} instead of {what}: {self.why or "no cause"}')
             self.order(command)
             if self.wait_until(lambda: done() or is_refused(), _REPEATED_AFTER_S):
                 if not is_refused():
@@ -145,8 +144,8 @@ class GraphClient(GraphListener):
                     said[names.REFUSAL]
                 ):
                     return self._ask(command, done, what, patience_s, withdrawn)
-                raise GraphRefusedError(said[names.REFUSAL])
-        raise GraphRefusedError(f'timed out after {patience_s:g} s waiting for {what}')
+                raise GraphError(said[names.REFUSAL])
+        raise GraphError(f'timed out after {patience_s:g} s waiting for {what}')
 
     def _becomes_whole(self, refused: str) -> bool:
         """Wait where that was the reason of a refusal; whether the streams have come since."""
@@ -165,7 +164,7 @@ class GraphClient(GraphListener):
         ended = self._followed(known, HOME, patience_s)
         if ended.state != OrderState.SUCCEEDED:
             prefix = f'{HOME}: ' if ended.state == OrderState.REJECTED else ''
-            raise GraphRefusedError(f'{prefix}{ended.words}')
+            raise GraphError(f'{prefix}{ended.words}')
         return ended.words
 
     def known_orders(self, patience_s: float = PATIENCE_S) -> frozenset[int]:
@@ -193,10 +192,10 @@ class GraphClient(GraphListener):
 
         while heard is None or heard.state == OrderState.EXECUTING:
             if not self.wait_until(says_more, patience_s):
-                raise GraphRefusedError(f'calibration has been silent for {patience_s:g} s')
+                raise GraphError(f'calibration has been silent for {patience_s:g} s')
             heard = self.order_since(known, name)
             if heard is None:
-                raise GraphRefusedError(f'calibration has restarted and no longer knows {name}')
+                raise GraphError(f'calibration has restarted and no longer knows {name}')
             if heard.state == OrderState.EXECUTING:
                 progress(heard.words, heard.progress)
         return heard
@@ -210,13 +209,13 @@ class GraphClient(GraphListener):
         known = self.known_orders(patience_s)
         try:
             self.trigger(names.CALIBRATION_RUN, patience_s)
-        except GraphRefusedError as error:
+        except GraphError as error:
             if not self._becomes_whole(str(error)):
                 raise
             self.trigger(names.CALIBRATION_RUN, patience_s)
         ended = self._followed(known, CALIBRATE, patience_s, progress)
         if ended.state != OrderState.SUCCEEDED:
-            raise GraphRefusedError(ended.words)
+            raise GraphError(ended.words)
 
         def is_told() -> bool:
             return self.calibration is not None and self.calibration.stamp_ns > ended.id
@@ -228,7 +227,7 @@ class GraphClient(GraphListener):
         """Call a service that only begins or ends something; what it answers."""
         answer = self.call(Trigger, service, Trigger.Request(), patience_s)
         if not answer.success:
-            raise GraphRefusedError(answer.message)
+            raise GraphError(answer.message)
         return str(answer.message)
 
     def client(self, kind: type, service: str) -> Client:
@@ -238,16 +237,16 @@ class GraphClient(GraphListener):
         return self._clients[service]
 
     def call(self, kind: type, service: str, request: Any, patience_s: float = PATIENCE_S) -> Any:
-        """Call a service and wait for its answer; NoGraphError if nobody serves it or answers."""
+        """Call a service and wait for its answer; GraphError if nobody serves it or answers."""
         client = self.client(kind, service)
         if not self.wait_until(client.service_is_ready, patience_s):
-            raise NoGraphError(f'nobody serves {service} in {self.where}')
+            raise GraphError(f'nobody serves {service} in {self.where}')
         return self.answer(client.call_async(request), service, patience_s)
 
     def answer(self, future: Future, what: str, patience_s: float = PATIENCE_S) -> Any:
         """Wait for the answer to a call."""
         if not self.wait_until(future.done, patience_s):
-            raise NoGraphError(f'{what} has not answered for {patience_s:g} s')
+            raise GraphError(f'{what} has not answered for {patience_s:g} s')
         return future.result()
 
     def close(self) -> None:

@@ -34,12 +34,8 @@ _HEARD = profile(Qos(200))
 _HEARD_LATCHED = profile(Qos(200, latched=True))
 
 
-class GraphRefusedError(EndoscopeError):
-    """The graph refused what was asked of it, or did not do it in time."""
-
-
-class NoGraphError(GraphRefusedError):
-    """Nobody answers."""
+class GraphError(EndoscopeError):
+    """Nobody answers, or the graph refused what was asked of it or did not do it in time."""
 
 
 @dataclass(frozen=True)
@@ -197,9 +193,9 @@ class GraphListener(ClosedOnExit):
     def wait_for(
         self, condition: Callable[[], bool], what: str, patience_s: float = PATIENCE_S
     ) -> None:
-        """Listen until something has come true; GraphRefusedError if it has not within so long."""
+        """Listen until something has come true; GraphError if it has not within so long."""
         if not self.wait_until(condition, patience_s):
-            raise GraphRefusedError(f'timed out after {patience_s:g} s waiting for {what}')
+            raise GraphError(f'timed out after {patience_s:g} s waiting for {what}')
 
     def close(self) -> None:
         """Listen no more; the node remains."""

@@ -18,7 +18,7 @@ from rclpy.task import Future
 
 from endoscope_core.errors import nearest
 from endoscope_nodes.client.graph_client import GraphClient
-from endoscope_nodes.client.graph_listener import PATIENCE_S, GraphRefusedError, NoGraphError
+from endoscope_nodes.client.graph_listener import PATIENCE_S, GraphError
 from endoscope_nodes.runtime.parameters import ParameterError
 
 _ROS_OWN = ('qos_overrides.', 'start_type_description_service')
@@ -112,9 +112,9 @@ def _names(client: GraphClient, node: str, patience_s: float) -> list[str]:
     ):
         others = client.nodes()
         if not others:
-            raise NoGraphError(f'no graph answers in {client.where}: start one with `graph`')
+            raise GraphError(f'no graph answers in {client.where}: start one with `graph`')
         if node in others:
-            raise NoGraphError(f'{node} does not answer in {client.where}')
+            raise GraphError(f'{node} does not answer in {client.where}')
         raise ParameterError(f'no node {node} in {client.where}; {nearest(node, sorted(others))}')
     known = client.call(
         ListParameters, f'{node}/list_parameters', ListParameters.Request(), patience_s
@@ -155,7 +155,7 @@ def set_parameters(
     kind, service = SetParametersAtomically, f'{node}/set_parameters_atomically'
     result = client.call(kind, service, _request(values), patience_s).result
     if not result.successful:
-        raise GraphRefusedError(result.reason or f'{node} refused it without a reason')
+        raise GraphError(result.reason or f'{node} refused it without a reason')
 
 
 def _request(values: Mapping[str, Any]) -> SetParametersAtomically.Request:

@@ -10,12 +10,11 @@ import pkgutil
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.errors import nearest
+from endoscope_core.errors import InputError, nearest
 from endoscope_core.physics.effect import (
     Effect,
     NominalPhysics,
     Symptom,
-    UnknownEffectError,
     in_order_of_chain,
 )
 
@@ -31,9 +30,9 @@ KNOWN: dict[str, Effect] = {**CATALOGUE, **NOMINAL_PHYSICS}
 
 
 def describe(effect_id: str) -> Effect:
-    """The effect, or the nominal physics, of that id; an UnknownEffectError names the nearest."""
+    """The effect, or the nominal physics, of that id; an InputError names the nearest."""
     if effect_id not in KNOWN:
-        raise UnknownEffectError(f'unknown effect {effect_id}: {nearest(effect_id, KNOWN)}')
+        raise InputError(f'unknown effect {effect_id}: {nearest(effect_id, KNOWN)}')
     return KNOWN[effect_id]
 
 

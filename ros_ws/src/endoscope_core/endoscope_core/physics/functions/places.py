@@ -10,15 +10,8 @@ from enum import StrEnum
 from typing import Any
 
 from endoscope_core.compiled import Array, compiled
-from endoscope_core.errors import nearest
-from endoscope_core.physics.effect import (
-    Effect,
-    Parameter,
-    Stage,
-    Traits,
-    UnknownEffectError,
-    in_order_of_chain,
-)
+from endoscope_core.errors import InputError, nearest
+from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits, in_order_of_chain
 from endoscope_core.physics.hooks import (
     COMMAND,
     EFFORT,
@@ -422,9 +415,9 @@ def describe_place(place_id: str) -> Place:
 
     Raises
     ------
-    UnknownEffectError
+    InputError
         If there is none; the message names the nearest.
     """
     if place_id not in FUNCTIONS:
-        raise UnknownEffectError(f'unknown place {place_id}: {nearest(place_id, FUNCTIONS)}')
+        raise InputError(f'unknown place {place_id}: {nearest(place_id, FUNCTIONS)}')
     return FUNCTIONS[place_id]
