@@ -83,7 +83,7 @@ def side_by_side[C: tuple[Any, ...]](
     """Yield each call with its future, as they are done."""
     from concurrent.futures import as_completed
 
-    from endoscope_core.worker_pool import worker_pool
+    from endoscope_core.workers import worker_pool
 
     with worker_pool(jobs) as pool:
         futures = {pool.submit(function, *call): call for call in calls}

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from endoscope_core.worker_pool import worker_pool
+from endoscope_core.workers import worker_pool
 
 PROGRAM = """
 import os
@@ -17,7 +17,7 @@ import signal
 import sys
 import time
 from pathlib import Path
-from endoscope_core.worker_pool import worker_pool
+from endoscope_core.workers import worker_pool
 
 
 def linger(folder):

@@ -19,13 +19,13 @@ from endoscope_core.rig import Rig
 from endoscope_core.signals import Signal, hold, move, sequence
 from endoscope_core.signals.command_file import JOINTS
 from endoscope_core.signals.motions import chirp, multisine, steps_with_holds, triangle
+from endoscope_core.workers import parallel_map
 from endoscope_explain.case import NextExperiment
 from endoscope_explain.decide.conclusions import spec_of
 from endoscope_explain.explanation import NamedEffect
 from endoscope_explain.fit.free_parameters import LEAD, effect_parameters, nominal_parameters
 from endoscope_explain.fit.model import Fit, JointModel, fit, joint_of, packed_joint
 from endoscope_explain.observe.observation import JointObservation, observe
-from endoscope_explain.parallel import parallel_map
 from endoscope_explain.recording import Recording, Series
 from endoscope_explain.search.screen import background, directions, screened
 from endoscope_explain.search.term import Term, starting_points

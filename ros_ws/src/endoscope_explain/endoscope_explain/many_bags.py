@@ -12,7 +12,7 @@ from typing import Any
 
 from endoscope_core.atomic_output import atomic_directory, require_free_directory
 from endoscope_core.errors import EndoscopeError
-from endoscope_core.worker_pool import worker_pool
+from endoscope_core.workers import worker_pool
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
 from endoscope_explain.report.sentences import told, verdict_sentence

@@ -27,7 +27,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print what was not said rightly and a table, or the numbers; return 0."""
-    from endoscope_core.worker_pool import worker_pool
+    from endoscope_core.workers import worker_pool
 
     with worker_pool(args.jobs) as pool:
         if args.derive:

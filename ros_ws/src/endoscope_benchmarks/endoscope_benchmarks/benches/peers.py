@@ -36,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
         table,
         versions,
     )
-    from endoscope_core.worker_pool import worker_pool
+    from endoscope_core.workers import worker_pool
 
     names = args.peer or list(PEERS)
     require_known('peer', names, PEERS)

@@ -30,7 +30,7 @@ from endoscope_benchmarks.hostile_files.text_case import (
     TableCase,
 )
 from endoscope_core.errors import EndoscopeError, printable
-from endoscope_core.worker_pool import worker_pool
+from endoscope_core.workers import worker_pool
 
 MEMORY = 2_000_000_000
 """Bytes that a process may take."""

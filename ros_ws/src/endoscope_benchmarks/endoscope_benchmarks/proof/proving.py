@@ -16,7 +16,7 @@ from endoscope_benchmarks.proof.trial import (
     followed,
     recorded,
 )
-from endoscope_core.worker_pool import worker_pool
+from endoscope_core.workers import worker_pool
 from endoscope_explain.report.numbers import digits
 
 Say = Callable[[str], None]

@@ -16,7 +16,7 @@ from endoscope_bringup.demo.page import report_page
 from endoscope_bringup.demo.procedure import TUBES, Tube, TubeRecording
 from endoscope_bringup.demo.results import DemoResults, table_rows
 from endoscope_core.atomic_output import write_text
-from endoscope_core.worker_pool import worker_pool
+from endoscope_core.workers import worker_pool
 
 REPORT = 'report.html'
 FIGURES = 'figures.json'

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from endoscope_core.workers import parallel_map
 from endoscope_explain.explanation import ChannelFit
 from endoscope_explain.observe.predicted_signals import RecordedView, SignalView
-from endoscope_explain.parallel import parallel_map
 from endoscope_explain.recording import Recording
 
 Array = NDArray[np.float64]

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.physics.effects import describe
+from endoscope_core.workers import parallel_map
 from endoscope_explain.decide.decision import Decision, MissingTerm, decide, share_explained
 from endoscope_explain.fit.evidence import log_evidence
 from endoscope_explain.fit.free_parameters import FreeParameter
 from endoscope_explain.fit.model import TO_THE_END, Fit, JointModel, fit, without_effect
-from endoscope_explain.parallel import parallel_map
 from endoscope_explain.search.levels import JointSearch, Level, search
 from endoscope_explain.search.refit import SETTLED, Candidate, candidate
 from endoscope_explain.search.term import Term

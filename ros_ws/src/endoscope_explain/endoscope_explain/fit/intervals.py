@@ -16,6 +16,7 @@ from endoscope_core.physics.effect import Effect
 from endoscope_core.physics.effects import lacking
 from endoscope_core.physics.functions.places import NODES, VALUES
 from endoscope_core.physics.layout import FRICTION_PROFILE, PROFILE_TERMS
+from endoscope_core.workers import parallel_map
 from endoscope_explain.criteria import REACH
 from endoscope_explain.explanation import NINETY_PERCENT, Estimate, NominalEstimate
 from endoscope_explain.fit.evidence import counts, is_noise, mean_squares, weights
@@ -27,7 +28,6 @@ from endoscope_explain.fit.free_parameters import (
 )
 from endoscope_explain.fit.model import Fit, broyden_fit
 from endoscope_explain.observe.observation import JointObservation
-from endoscope_explain.parallel import parallel_map
 
 # A fit's misfit is mostly an error of form, not noise: friction along a real sheath has a finer
 # profile than the few terms that are fitted, and a law has finer details than the function that

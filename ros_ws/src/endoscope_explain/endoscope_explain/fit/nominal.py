@@ -13,6 +13,7 @@ from scipy.ndimage import median_filter
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.layout import OUT_JOINT
+from endoscope_core.workers import parallel_map
 from endoscope_explain.audit.misreading import OTHER_RIGS
 from endoscope_explain.fit.evidence import is_noise
 from endoscope_explain.fit.free_parameters import (
@@ -32,7 +33,6 @@ from endoscope_explain.fit.model import (
 )
 from endoscope_explain.observe.observation import Channel, JointObservation, StampsOnTicks
 from endoscope_explain.observe.predicted_signals import view
-from endoscope_explain.parallel import parallel_map
 from endoscope_explain.recording import Recording, signal_name
 
 Array = NDArray[np.float64]

@@ -4,8 +4,8 @@ import math
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass
 
+from endoscope_core.workers import parallel_map
 from endoscope_explain.fit.model import Fit
-from endoscope_explain.parallel import parallel_map
 from endoscope_explain.search.null_rigs import NEAR
 from endoscope_explain.search.refit import (
     Candidate,

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from endoscope_core.workers import parallel_map
 from endoscope_explain.fit.evidence import counts, is_noise, log_likelihood, mean_squares
 from endoscope_explain.fit.intervals import other_forms, reading
 from endoscope_explain.fit.model import Fit, broyden_fit, jacobian
 from endoscope_explain.observe.observation import WHITE, JointObservation
-from endoscope_explain.parallel import parallel_map
 from endoscope_explain.search.refit import TRIAL_STEPS
 from endoscope_explain.search.screen import Background, Directions, gains
 from endoscope_explain.search.term import Term

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.workers import parallel_map
 from endoscope_explain.fit.evidence import counts, log_likelihood, weights
 from endoscope_explain.fit.model import Fit, JointModel
-from endoscope_explain.parallel import parallel_map
 from endoscope_explain.search.term import Term, Variant, mirrored
 
 Array = NDArray[np.float64]

@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from endoscope_explain.parallel import parallel_map
+from endoscope_core.workers import parallel_map
 
 
 def test_results_come_in_the_order_of_the_tasks():
@@ -59,7 +59,7 @@ LINGERING = """
 import os
 import signal
 import threading
-from endoscope_explain.parallel import parallel_map
+from endoscope_core.workers import parallel_map
 begun = threading.Barrier(2)
 def linger(_):
     if begun.wait() == 0:
