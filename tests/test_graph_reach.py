@@ -1,5 +1,7 @@
 """A tube lets the tip be bent only so far: calibration finds it, and what asks for more is cut."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from simulated_graph import TICK_RATE, SimulatedGraph
@@ -8,8 +10,15 @@ from tubes import tube_of_size
 from endoscope_core.control import Reach, reach
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.physics import load_plant
-from endoscope_nodes.names import JOINTS, MOTOR_COMMAND, MOTORS, SLAVE_COMMAND
+from endoscope_core.rig import shipped_rig
+from endoscope_nodes.names import JOINTS, MOTOR_COMMAND, MOTOR_MEASURED, MOTORS, SLAVE_COMMAND
 from endoscope_nodes.runtime.diagnostics import WARN
+
+
+def rig_of_reach(angle):
+    """The shipped rig with another largest desired bending, in rad."""
+    rig = shipped_rig()
+    return dataclasses.replace(rig, joints=dataclasses.replace(rig.joints, reach=angle))
 
 
 def warnings(graph, name):
@@ -52,3 +61,28 @@ def test_the_compensator_cuts_what_a_console_asks_for_beyond_it():
         said = warnings(graph, 'compensator: output')[-1]
         assert 'bend_y from -11 to 17 deg, more was asked for' in said
         assert int(graph.reported('compensator: output')['cut to the reach']) > TICK_RATE
+
+
+def test_home_leads_back_from_shafts_beyond_the_reach():
+    """Compensation turns them further than the reach of the joint, up to the drive."""
+    with SimulatedGraph(
+        rig=rig_of_reach(0.6), overrides={'controller': {'active': False}}
+    ) as graph:
+        compensator, gear = graph.nodes['compensator'], shipped_rig().joints.gear
+        graph.enable()
+        compensator.findings = CalibrationFindings(class_deg=100)
+        graph.set('compensator', mode='dahl')
+        graph.set('console', source='motion')
+        graph.advance(2.0)
+        graph.set('console', source='none')
+        graph.advance(0.3)
+        shafts = graph.listen(MOTOR_MEASURED, MOTORS)
+        graph.advance(0.02)
+        assert max(map(abs, shafts[-1].position)) > 0.7 * gear
+        shafts.clear()
+        graph.command('home')
+        graph.advance(3.0)
+        assert graph.reported('calibration: procedure')['last'] == 'home reached'
+        turned = np.abs([sample.position for sample in shafts])
+        assert turned.max() < turned[0].max() + 0.01
+        assert sum(compensator.calibration_gate.refused.values()) == 0

@@ -1,9 +1,11 @@
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from endoscope_core.rig import shipped_rig
 from endoscope_core.safety import CommandGate, CommandLimits, Refusal
 
 MS = 1_000_000
@@ -101,6 +103,28 @@ def test_from_beyond_the_reach_there_is_a_way_back_only():
     assert gate.check(MS, beyond, MS, beyond) is None
     assert gate.check(2 * MS, (1.301, 0.0), 2 * MS, beyond) is Refusal.RANGE
     assert gate.check(3 * MS, (1.299, 0.0), 3 * MS, beyond) is None
+
+
+@pytest.mark.parametrize('side', [1.0, -1.0])
+def test_the_first_command_of_a_stream_leads_no_further_beyond_the_reach(side):
+    gate = CommandGate(LIMITS)
+    measured = (side * 1.05, 0.0)
+    for k, angle in enumerate((1.15, 1.051)):
+        assert gate.check((k + 1) * MS, (side * angle, 0.0), MS, measured) is Refusal.RANGE
+    assert gate.check(3 * MS, (side * 1.05, 0.0), 3 * MS, measured) is None
+    inside = CommandGate(LIMITS)
+    assert inside.check(MS, (side * 1.01, 0.0), MS, (side * 0.99, 0.0)) is Refusal.RANGE
+
+
+def test_a_stream_that_begins_where_the_rig_says_is_obeyed_though_the_pose_is_measured_again():
+    facts = shipped_rig().joints
+    limits = CommandLimits(facts.reach, facts.speed, facts.entry_step)
+    for bent in (0.3, facts.reach - 0.01, facts.reach + 0.01, facts.reach + 1.0):
+        for noise in (-0.02, 0.0, 0.02):
+            start = facts.entry((bent, -bent))
+            again = (bent + noise, -bent - noise)
+            assert CommandGate(limits).check(MS, start, MS, again) is None
+            assert np.all(np.abs(start) <= bent)
 
 
 def test_after_a_pause_a_stream_begins_anew_at_the_measured_position():

@@ -1,6 +1,7 @@
 """rig.yaml: gear, limits, time-outs and devices of a rig, said once for every node."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
@@ -36,6 +37,17 @@ class JointFacts:
     hand_speed: Annotated[float, within(0.01, 20.0)]
     # Largest distance in rad from the measured pose to the first command of a stream.
     entry_step: Annotated[float, within(0.001, 1.0)]
+
+    def entry(self, measured: Sequence[float]) -> tuple[float, ...]:
+        """Where a stream of commands begins that comes from a measured pose (J,), in rad.
+
+        That is there or, from beyond the reach, half an entry step nearer to it: nothing goes
+        further out, and the command gate measures again, with noise of its own.
+        """
+        return tuple(
+            math.copysign(min(abs(x), max(self.reach, abs(x) - 0.5 * self.entry_step)), x)
+            for x in measured
+        )
 
 
 @dataclass(frozen=True)

@@ -162,7 +162,7 @@ class CommandGate:
         if self._alone and self._disagrees(stamp_ns, received_ns):
             self._forget_stream()
         streaming = self.is_fresh(received_ns)
-        refusal = self._check_range(position, self._position if streaming else measured, streaming)
+        refusal = self._check_range(position, self._position if streaming else measured)
         refusal = refusal or self._check_stamp(stamp_ns, received_ns)
         if refusal is not None:
             return refusal
@@ -206,17 +206,13 @@ class CommandGate:
             self._gaps.clear()
         return gap_ns / self._interval_ns if self._interval_ns else 1.0
 
-    def _check_range(
-        self, position: Sequence[float], here: Sequence[float], streaming: bool
-    ) -> Refusal | None:
+    def _check_range(self, position: Sequence[float], here: Sequence[float]) -> Refusal | None:
         """From beyond the reach, which a measured pose may be, there is a way back only."""
         reach = self.limits.reach
         if max(map(abs, position)) <= reach:
             return None
         for value, now in zip(position, here, strict=True):
-            if abs(value) > reach and abs(value) > abs(now) + (
-                0.0 if streaming else self.limits.max_step
-            ):
+            if abs(value) > max(reach, abs(now)):
                 return self.refuse(Refusal.RANGE, f'{value:.4g} rad beyond {reach:.4g}')
         return None
 

@@ -177,7 +177,7 @@ class CalibrationNode(EndoscopeNode):
         self._order, self._began_ns = order, now
         self._commands.session = self._session.name
         self._run = CalibrationRun(
-            [x / self.rig.joints.gear for x in shafts],
+            self.rig.joints.entry([x / self.rig.joints.gear for x in shafts]),
             len(names.WIRES),
             TICK_NS,
             self._settings.return_speed,

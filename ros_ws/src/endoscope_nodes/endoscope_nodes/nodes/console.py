@@ -266,7 +266,7 @@ class ConsoleNode(EndoscopeNode):
             pose = self._pose.bending()
             if pose is None or not self._begin():
                 return
-            self._stay = pose
+            pose = self._stay = self.rig.joints.entry(pose)
             self._approach = approach(
                 pose, motion.at(self._next, pose)[0], self._settings.approach_speed, TICK_S
             )
@@ -294,9 +294,13 @@ class ConsoleNode(EndoscopeNode):
             return
         if followed is None and self._handle.alive(self.ticker.monotonic_ns()):
             # A handle that was silent while the slave was told to stay is taken up from there.
-            pose = self._hand_shaper.position if self._moving else self._pose.bending()
-            if pose is None or not (self._moving or self._begin()):
-                return
+            if self._moving:
+                pose = self._hand_shaper.position
+            else:
+                measured = self._pose.bending()
+                if measured is None or not self._begin():
+                    return
+                pose = self.rig.joints.entry(measured)
             self._handle.scale = self._settings.scale
             self._handle.engage(pose)
             self._hand_shaper.restart(pose)
