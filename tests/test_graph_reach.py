@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from commanded_graph import Sender
 from simulated_graph import TICK_RATE, SimulatedGraph
 from tubes import tube_of_size
 
@@ -11,7 +12,14 @@ from endoscope_core.control import Reach, reach
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.physics import load_plant
 from endoscope_core.rig import shipped_rig
-from endoscope_nodes.names import JOINTS, MOTOR_COMMAND, MOTOR_MEASURED, MOTORS, SLAVE_COMMAND
+from endoscope_nodes.names import (
+    CALIBRATION_COMMAND,
+    JOINTS,
+    MOTOR_COMMAND,
+    MOTOR_MEASURED,
+    MOTORS,
+    SLAVE_COMMAND,
+)
 from endoscope_nodes.runtime.diagnostics import WARN
 
 
@@ -61,6 +69,33 @@ def test_the_compensator_cuts_what_a_console_asks_for_beyond_it():
         said = warnings(graph, 'compensator: output')[-1]
         assert 'bend_y from -11 to 17 deg, more was asked for' in said
         assert int(graph.reported('compensator: output')['cut to the reach']) > TICK_RATE
+
+
+def test_a_calibration_that_needs_more_than_the_reach_is_refused_and_nothing_moves():
+    with SimulatedGraph(rig=rig_of_reach(1.2)) as graph:
+        graph.enable()
+        goals = graph.listen(MOTOR_COMMAND, MOTORS)
+        answer = graph.call_calibration()
+        assert not answer.success
+        assert 'every joint 1.571 rad either way, beyond joints.reach 1.2' in answer.message
+        assert '`endoscope operate set compensator.mode none`' in answer.message
+        graph.advance(3.0)
+        assert goals == []
+        assert graph.state == 'ENABLED'
+
+
+def test_nothing_that_a_calibration_commands_leads_beyond_the_reach():
+    """Whoever commands it: the compensator has a gate of its own."""
+    with SimulatedGraph(rig=rig_of_reach(0.3), without=['calibration']) as graph:
+        compensator, gear = graph.nodes['compensator'], shipped_rig().joints.gear
+        graph.enable()
+        sender = Sender(graph, CALIBRATION_COMMAND)
+        goals = graph.listen(MOTOR_COMMAND, MOTORS)
+        for k in range(TICK_RATE):
+            sender.send([0.5 * k / TICK_RATE, 0.0], velocity=[0.5, 0.0])
+            graph.advance(1.0 / TICK_RATE)
+        assert max(goal.position[0] for goal in goals) == pytest.approx(0.3 * gear, abs=2e-3)
+        assert compensator.calibration_gate.last_reason.endswith('rad beyond 0.3')
 
 
 def test_home_leads_back_from_shafts_beyond_the_reach():

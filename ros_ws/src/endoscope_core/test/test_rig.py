@@ -29,6 +29,7 @@ def test_what_a_file_does_not_say_is_as_shipped(tmp_path):
         ('motors: {speed: fast}', "motors.speed is 'fast': give a number"),
         ('motors: 3', 'motors is 3: give a mapping with reach, speed'),
         ('joints: {drive: 9.0}', 'beyond motors.reach 1.6'),
+        ('joints: {drive: 1.5}', 'joints.drive 1.5 rad is less than joints.reach 1.75 rad'),
         (
             'devices: {motors: dynamicsel}',
             "motors is 'dynamicsel': give one of simulated, dynamixel",

@@ -216,9 +216,9 @@ TOPICS = (
         'time in ns at which it was given, or just after it where another has that, `state` is '
         '`executing`, `succeeded`, `aborted` or `rejected`, and `waiting` before the first order; '
         '`phase` is `returning`, `resting`, `moving` or `judging`, `progress` goes from 0 to 1, '
-        'and `code` says why it was aborted or rejected: `busy`, `no_session`, `session_ended`, '
-        '`tension_ceiling`, `stream_silent`, `tension_gap`, `unknown_tube`, `not_judged` or '
-        '`not_reached`; the message is the same in words',
+        'and `code` says why it was aborted or rejected: `busy`, `beyond_reach`, `no_session`, '
+        '`session_ended`, `tension_ceiling`, `stream_silent`, `tension_gap`, `unknown_tube`, '
+        '`not_judged` or `not_reached`; the message is the same in words',
         offered=RESULT,
         asked=RESULT,
         said_by=('calibration',),

@@ -24,7 +24,9 @@ class JointFacts:
     """What is the same for every joint of the bending section; SI units."""
 
     gear: Annotated[float, within(0.01, 100.0)]  # shaft angle for one radian at the joint
-    reach: Annotated[float, within(0.1, 3.1)]  # largest desired bending in rad, either way
+    # Largest desired bending in rad, either way, whoever desires it: console, handle, program or
+    # calibration, which is refused where its motion needs more.
+    reach: Annotated[float, within(0.1, 3.1)]
     # Largest joint-equivalent motor angle in rad, either way; what compensation adds to the
     # desired bending has its place between the two.
     drive: Annotated[float, within(0.1, 10.0)]
@@ -148,7 +150,7 @@ class SimulationFacts:
 class Rig:
     """A rig; see the classes of its parts.
 
-    ValueError if `drive` times gear is beyond the reach of a shaft.
+    ValueError if `drive` is less than the reach of a joint, or times gear beyond that of a shaft.
     """
 
     joints: JointFacts
@@ -162,6 +164,11 @@ class Rig:
     simulation: SimulationFacts
 
     def __post_init__(self) -> None:
+        if self.joints.drive < self.joints.reach:
+            raise ValueError(
+                f'joints.drive {self.joints.drive:g} rad is less than joints.reach '
+                f'{self.joints.reach:g} rad: the motors could not follow up to the reach'
+            )
         shaft = self.joints.drive * self.joints.gear
         if shaft > self.motors.reach:
             raise ValueError(

@@ -112,6 +112,12 @@ class CalibrationMotion:
         """First sample of the last whole period, which has forgotten where the motion began."""
         return math.ceil(self.signal.steady[0] * CALIBRATION_RATE)
 
+    @property
+    def amplitude(self) -> float:
+        """Largest angle in rad that any joint is sent to, either way, on the way back too."""
+        time = np.arange(round(self.signal.duration * CALIBRATION_RATE) + 1) / CALIBRATION_RATE
+        return float(np.abs(self.signal(time)[0]).max())
+
 
 _MOTIONS: dict[str, tuple[Callable[[], Signal], float]] = {
     SINUSOID: (calibration_sinusoid, CALIBRATION_RECORD_DURATION),

@@ -25,6 +25,7 @@ class OrderCode(StrEnum):
 
     NONE = ''
     BUSY = 'busy'
+    BEYOND_REACH = 'beyond_reach'
     NO_SESSION = 'no_session'
     SESSION_ENDED = 'session_ended'
     TENSION_CEILING = 'tension_ceiling'

@@ -76,6 +76,7 @@ class CalibrationNode(EndoscopeNode):
         self._settings = p
         self._timeout_ns = self.rig.timeouts.stream_ns
         self._motion = calibration_motion(p.motion)
+        self._beyond_reach = self._reach_exceeded()
         self._classifier = self._load_classifier(p.weights)
         self._thread = ThreadPoolExecutor(1)
         self._run: CalibrationRun | None = None
@@ -112,6 +113,18 @@ class CalibrationNode(EndoscopeNode):
     def active(self) -> bool:
         """Whether the slave is being moved for a calibration or home."""
         return self._run is not None
+
+    def _reach_exceeded(self) -> str:
+        """Say that the motion needs more than the reach; empty where it does not."""
+        # A smaller motion is no way out: the classifier knows the tensions of this one alone.
+        reach, amplitude = self.rig.joints.reach, self._motion.amplitude
+        if amplitude <= reach:
+            return ''
+        return (
+            f'a calibration takes every joint {amplitude:.4g} rad either way, beyond joints.reach '
+            f'{reach:g} of the rig; raise joints.reach where the instrument may be bent that far, '
+            f'or work without calibration (`{self.operate("set compensator.mode none")}`)'
+        )
 
     def _load_classifier(self, weights: str) -> Classifier:
         # The threads of one judgement would stand in the way of the other nodes.
@@ -160,7 +173,7 @@ class CalibrationNode(EndoscopeNode):
 
     def _start(self, homing: bool) -> str:
         """Begin, or say why not."""
-        trouble, code = self._obstacle()
+        trouble, code = self._obstacle(homing)
         shafts = self._pose.shafts()
         now = self.ticker.now_ns()
         # Several may be given in one instant of simulated time.
@@ -192,10 +205,12 @@ class CalibrationNode(EndoscopeNode):
         self.diagnostics.publish()
         return ''
 
-    def _obstacle(self) -> tuple[str, OrderCode]:
+    def _obstacle(self, homing: bool) -> tuple[str, OrderCode]:
         """Why nothing can begin, in words (empty where it can) and as a code."""
         if self._run is not None:
             return f'busy: {self._run.step}', OrderCode.BUSY
+        if not homing and self._beyond_reach:
+            return self._beyond_reach, OrderCode.BEYOND_REACH
         if not self._session.name:
             return 'no motion session is open: the slave has to be ENABLED', OrderCode.NO_SESSION
         return self._trouble(), self._code_of_trouble()

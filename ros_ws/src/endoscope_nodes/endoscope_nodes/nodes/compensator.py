@@ -73,7 +73,7 @@ class CompensatorNode(EndoscopeNode):
             CommandLimits(facts.reach, facts.speed, facts.entry_step, timeout_ns)
         )
         self.calibration_gate = CommandGate(
-            CommandLimits(facts.drive, facts.speed, facts.entry_step, timeout_ns)
+            CommandLimits(facts.reach, facts.speed, facts.entry_step, timeout_ns)
         )
         self.correction_gate = CommandGate(
             CommandLimits(facts.correction, motors.speed / facts.gear, facts.correction, timeout_ns)
