@@ -2,6 +2,7 @@
 
 from endoscope_devices.em_tracker.aurora_tracker import (
     AuroraTracker,
+    TrackerDevice,
     TrackerReading,
     TrackerSettings,
 )
@@ -14,6 +15,7 @@ from endoscope_devices.em_tracker.registration import (
 __all__ = [
     'AuroraTracker',
     'RegistrationWindow',
+    'TrackerDevice',
     'TrackerReading',
     'TrackerSettings',
     'load_registration',

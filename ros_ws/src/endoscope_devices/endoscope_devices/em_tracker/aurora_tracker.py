@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import dataclass
+from typing import Protocol
 
 from endoscope_devices.device import DeviceError, ReadingThread
 from endoscope_devices.em_tracker.aurora_port import AuroraPort, TrackerReplyError
@@ -81,6 +82,25 @@ class TrackerReading:
     frame: int  # number
     position: tuple[float, ...]  # m, (3,)
     orientation: tuple[float, ...]  # unit quaternion x, y, z, w
+
+
+class TrackerDevice(Protocol):
+    """What the node `em_tracker` asks of a tracker, of whatever maker.
+
+    A real one reads in a thread of its own: no call waits for the tracker.
+    """
+
+    def open(self) -> None:
+        """Start to read; a tracker that is not there yet is waited for, and is a trouble."""
+
+    def take(self) -> list[TrackerReading]:
+        """New poses of the sensor since the last call, oldest first, none of them twice."""
+
+    def health(self) -> tuple[str, dict[str, object]]:
+        """What is wrong (empty if nothing), and figures for diagnostics."""
+
+    def close(self) -> None:
+        """Let go of the tracker."""
 
 
 class AuroraTracker(ReadingThread[TrackerReading]):

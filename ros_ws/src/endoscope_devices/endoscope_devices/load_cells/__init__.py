@@ -3,6 +3,7 @@
 from endoscope_devices.load_cells.calibration_file import LoadCellCalibration, load_calibration
 from endoscope_devices.load_cells.modbus_load_cells import (
     CONNECTIONS,
+    LoadCellDevice,
     ModbusLoadCells,
     WireReading,
     modbus_rtu,
@@ -18,6 +19,7 @@ from endoscope_devices.load_cells.tare import (
 __all__ = [
     'CONNECTIONS',
     'LoadCellCalibration',
+    'LoadCellDevice',
     'ModbusLoadCells',
     'TareError',
     'WireReading',

@@ -4,6 +4,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 from endoscope_devices.device import ReadingThread
 from endoscope_devices.load_cells.calibration_file import (
@@ -35,6 +36,38 @@ class WireReading:
 
     time_ns: int  # when they were measured, of ``time.monotonic_ns``
     tension: tuple[float, ...]  # N, (W,)
+
+
+class LoadCellDevice(Protocol):
+    """What the node `load_cells` asks of load cells, of whatever maker.
+
+    A real one reads in a thread of its own: no call waits for the cells.
+    """
+
+    def open(self) -> None:
+        """Start to read; cells that are not there yet are waited for, and are a trouble."""
+
+    def take(self) -> list[WireReading]:
+        """Believable readings of all wires since the last call, oldest first."""
+
+    def note_shafts(self, velocity: Sequence[float]) -> None:
+        """Take the speed of the motor shafts (J,) in rad/s, so that moving wires are not tared."""
+
+    def tared(self) -> LoadCellCalibration:
+        """The calibration in which the mean tension of the last second is zero, or TareError."""
+
+    def use(self, calibration: LoadCellCalibration) -> None:
+        """Go on with other zeros."""
+
+    @property
+    def trouble(self) -> str:
+        """What is wrong; empty if nothing. Asked for in every tick."""
+
+    def health(self) -> tuple[str, dict[str, object]]:
+        """What is wrong (empty if nothing), and figures for diagnostics."""
+
+    def close(self) -> None:
+        """Let go of the cells."""
 
 
 class ModbusLoadCells(ReadingThread[WireReading]):
@@ -175,7 +208,7 @@ def modbus_tcp(address: str, calibration: LoadCellCalibration) -> ModbusLoadCell
     )
 
 
-CONNECTIONS: dict[str, Callable[[str, LoadCellCalibration], ModbusLoadCells]] = {
+CONNECTIONS: dict[str, Callable[[str, LoadCellCalibration], LoadCellDevice]] = {
     'modbus_rtu': modbus_rtu,
     'modbus_tcp': modbus_tcp,
 }

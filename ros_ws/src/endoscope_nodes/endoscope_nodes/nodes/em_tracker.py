@@ -17,6 +17,7 @@ from endoscope_core.physics import SensorModel, recording_faults
 from endoscope_devices.em_tracker import (
     AuroraTracker,
     RegistrationWindow,
+    TrackerDevice,
     TrackerReading,
     TrackerSettings,
     load_registration,
@@ -46,7 +47,7 @@ class EmTrackerNode(EndoscopeNode):
         p = self._settings
         self._last_ns = 0
         self._out_of_reach = 0
-        self._tracker: AuroraTracker | None = None
+        self._tracker: TrackerDevice | None = None
         self._window = RegistrationWindow()
         self._registration: StraightRegistration | None = None
         self._pose = PoseStamped()
@@ -79,7 +80,7 @@ class EmTrackerNode(EndoscopeNode):
         """Name the device."""
         return f'tracker {self._device_name}'
 
-    def _connect(self, device: str, p: EmTrackerParameters) -> AuroraTracker:
+    def _connect(self, device: str, p: EmTrackerParameters) -> TrackerDevice:
         self.require_real_time(device)
         if not p.port:
             raise ParameterError(f"em_tracker: parameter 'port' is empty: {device} needs it")

@@ -5,7 +5,7 @@ from endoscope_core.physics import SensorModel
 from endoscope_devices.device import DeviceError
 from endoscope_devices.load_cells import (
     CONNECTIONS,
-    ModbusLoadCells,
+    LoadCellDevice,
     TareError,
     apply_saved_tare,
     load_calibration,
@@ -37,7 +37,7 @@ class LoadCellsNode(EndoscopeNode):
         p = self._settings
         self._last_ns = 0
         self._told = ''
-        self._cells: ModbusLoadCells | None = None
+        self._cells: LoadCellDevice | None = None
         self._measured = JointPublisher(
             self, names.WIRES_MEASURED, names.WIRES, ('effort',), SENSOR_OFFERED
         )
@@ -64,7 +64,7 @@ class LoadCellsNode(EndoscopeNode):
         """Name the device."""
         return f'load cells {self._device_name}'
 
-    def _connect(self, device: str, p: LoadCellsParameters) -> ModbusLoadCells:
+    def _connect(self, device: str, p: LoadCellsParameters) -> LoadCellDevice:
         self.require_real_time(device)
         for name, value in (('port', p.port), ('calibration_file', p.calibration_file)):
             if not value:
