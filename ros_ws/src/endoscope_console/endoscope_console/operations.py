@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
+from endoscope_console import orders
 from endoscope_console.access import OPERATOR
 from endoscope_console.alarms import Alarms
 from endoscope_console.beat import Beat, Situation
@@ -16,22 +17,6 @@ from endoscope_console.clients import Client, Clients
 from endoscope_console.explanations import Explanations
 from endoscope_console.graph_side import PATIENCE_S, GraphSide, Settings, identified
 from endoscope_console.handle_place import HandlePlace
-from endoscope_console.orders import (
-    HALTS,
-    Acknowledge,
-    Bags,
-    Calibrate,
-    Cancel,
-    Claim,
-    Explain,
-    Order,
-    Play,
-    Record,
-    Release,
-    Set,
-    State,
-    in_words,
-)
 from endoscope_console.teleop.frames import InputFrame
 from endoscope_console.teleop.lease import Lease
 from endoscope_console.teleop.operator import DeadManState, Reason
@@ -48,7 +33,14 @@ _WAITING_ORDERS = 16
 # The console tells once a second how far it is; a word from before it was asked means nothing.
 _NEXT_WORD_NS = 1_500_000_000
 _EXPERIMENT = 'an experiment'
-_NO_LEASE = (Claim, Release, Bags, Explain, Cancel, Acknowledge)
+_NO_LEASE = (
+    orders.Claim,
+    orders.Release,
+    orders.Bags,
+    orders.Explain,
+    orders.Cancel,
+    orders.Acknowledge,
+)
 
 
 @dataclass
@@ -153,7 +145,7 @@ class Operations:
             scale=graph.settings.scale,
         )
 
-    async def obey(self, client: Client, order: Order) -> dict[str, Any]:
+    async def obey(self, client: Client, order: orders.Order) -> dict[str, Any]:
         """Do what a client asks for; the answer, in which `ok` and `why` say what became of it."""
         answer: dict[str, Any] = {}
         try:
@@ -168,52 +160,52 @@ class Operations:
             why, ok = str(error), False
             self.counts['refused: orders'] += 1
         # A viewer could fill the recording with what is refused anyhow.
-        if client.role == OPERATOR and not isinstance(order, Bags):
-            self.graph.log(in_words(order), client.id, client.address, ok, why)
+        if client.role == OPERATOR and not isinstance(order, orders.Bags):
+            self.graph.log(orders.in_words(order), client.id, client.address, ok, why)
         return {'op': 'answer', 'id': order.id, 'ok': ok, 'why': why, **answer}
 
-    def _check(self, client: Client, order: Order) -> None:
+    def _check(self, client: Client, order: orders.Order) -> None:
         if client.role != OPERATOR:
             raise EndoscopeError('a viewer only looks on')
         if isinstance(order, _NO_LEASE) or client.id == self.lease.holder:
             return
         holder = self.holder
-        if isinstance(order, Record) and not self.lease.holder:
+        if isinstance(order, orders.Record) and not self.lease.holder:
             return
         who = 'nobody operates: take the controls first'
         raise EndoscopeError(f'{holder.label} operates' if holder else who)
 
-    async def _carry_out(self, client: Client, order: Order) -> str | Mapping[str, Any]:
+    async def _carry_out(self, client: Client, order: orders.Order) -> str | Mapping[str, Any]:
         match order:
-            case Claim():
+            case orders.Claim():
                 return await self.claim(client, order.take)
-            case Release():
+            case orders.Release():
                 return self._release(client)
-            case State():
+            case orders.State():
                 return await self._state(order.command)
-            case Calibrate():
+            case orders.Calibrate():
                 return await self._moving(
                     'calibration', partial(self._calibrate, self._withdrawn())
                 )
-            case Set():
+            case orders.Set():
                 return await self._set(order)
-            case Record():
+            case orders.Record():
                 service = RECORDER_START if order.on else RECORDER_STOP
                 return await self._ask(partial(self.graph.client.trigger, service, PATIENCE_S))
-            case Acknowledge():
+            case orders.Acknowledge():
                 self.alarms.acknowledge(order.alarm)
                 return ''
-            case Bags():
+            case orders.Bags():
                 own = await self._ask(self.graph.plant)
                 return await self._ask(self.explanations.listing) | {'own_plant': own}
-            case Explain():
+            case orders.Explain():
                 own = '' if order.plant else await self._ask(self.graph.plant)
                 return await self.explanations.begin(
                     order.bag, order.plant, order.baseline, order.validate, own
                 )
-            case Cancel():
+            case orders.Cancel():
                 return await self.explanations.cancel(order.explanation)
-            case Play():
+            case orders.Play():
                 return await self._play(client, order.explanation)
 
     async def _ask[T](self, ask: Callable[[], T]) -> T:
@@ -297,7 +289,7 @@ class Operations:
 
     async def _state(self, command: str) -> str:
         graph = self.graph.client
-        if command in HALTS:
+        if command in orders.HALTS:
             # At once: no thread has to be free for it, and what was asked for before is over.
             self._halts += 1
             graph.order(command)
@@ -384,7 +376,7 @@ class Operations:
                 self.graph.log(f'console.source {FOLLOW_THE_HANDLE}', '', '', False, str(error))
             self.graph.ask_for_settings(time.monotonic_ns())
 
-    async def _set(self, order: Set) -> str:
+    async def _set(self, order: orders.Set) -> str:
         if order.scale is not None:
             if self.beat.said.state is DeadManState.ENGAGED:
                 raise EndoscopeError('the scale changes only while nothing is held')

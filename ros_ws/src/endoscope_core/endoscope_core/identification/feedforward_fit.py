@@ -15,17 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
-from endoscope_core.hysteresis import (
-    AsymmetricBoucWenParameters,
-    BoucWenParameters,
-    DahlParameters,
-    PlayParameters,
-    PrandtlIshlinskiiParameters,
-    direct_inverse,
-    forward,
-    prandtl_ishlinskii_forward,
-    prandtl_ishlinskii_inverse,
-)
+from endoscope_core import hysteresis
 from endoscope_core.hysteresis.inverse import HysteresisParameters
 from endoscope_core.hysteresis.memory_model import (
     GREATEST_ALPHA,
@@ -96,57 +86,59 @@ def candidates_for(model: HysteresisParameters) -> Candidates:
     construction. Gain, lag and sharpness are free; offset and skew are the model's. `rho` hardly
     matters and is kept where the state leaves saturation gently.
     """
-    if isinstance(model, PrandtlIshlinskiiParameters):
+    if isinstance(model, hysteresis.PrandtlIshlinskiiParameters):
         # Its inverse is exact: only the scales of its weights and thresholds are free.
         return _play_stack(model)
     gain_and_lag = [
         (max(0.7 * model.alpha, SMALLEST_ALPHA), min(1.4 * model.alpha, GREATEST_ALPHA)),
         (0.01, min(2.5 * model.lag + 0.2, GREATEST_LAG)),
     ]
-    if isinstance(model, BoucWenParameters):
+    if isinstance(model, hysteresis.BoucWenParameters):
         return Candidates([*gain_and_lag, (1.0, 4.0)], _bouc_wen)
-    if isinstance(model, DahlParameters):
+    if isinstance(model, hysteresis.DahlParameters):
         return Candidates([*gain_and_lag, (0.6, 3.0)], lambda x: _dahl(x, model.offset))
-    if isinstance(model, PlayParameters):
+    if isinstance(model, hysteresis.PlayParameters):
         return Candidates(gain_and_lag, lambda x: _play(x, model.offset))
     return Candidates([*gain_and_lag, (1.0, 4.0)], lambda x: _asymmetric(x, model))
 
 
-def _bouc_wen(x: Sequence[float]) -> BoucWenParameters:
+def _bouc_wen(x: Sequence[float]) -> hysteresis.BoucWenParameters:
     alpha, lag, n = x
-    return BoucWenParameters.from_shape(alpha, lag, lag / (alpha * _SLOPE - 1.0), _RHO, n)
+    return hysteresis.BoucWenParameters.from_shape(
+        alpha, lag, lag / (alpha * _SLOPE - 1.0), _RHO, n
+    )
 
 
-def _dahl(x: Sequence[float], offset: float) -> DahlParameters:
+def _dahl(x: Sequence[float], offset: float) -> hysteresis.DahlParameters:
     alpha, lag, exponent = x
     travel = 2.0**exponent * lag / (alpha * _SLOPE - 1.0)
-    return DahlParameters(alpha, lag, travel, exponent, offset)
+    return hysteresis.DahlParameters(alpha, lag, travel, exponent, offset)
 
 
-def _play(x: Sequence[float], offset: float) -> PlayParameters:
+def _play(x: Sequence[float], offset: float) -> hysteresis.PlayParameters:
     alpha, lag = x
-    return PlayParameters(alpha, lag, lag / (alpha * _SLOPE - 1.0), offset)
+    return hysteresis.PlayParameters(alpha, lag, lag / (alpha * _SLOPE - 1.0), offset)
 
 
 def _asymmetric(
-    x: Sequence[float], model: AsymmetricBoucWenParameters
-) -> AsymmetricBoucWenParameters:
+    x: Sequence[float], model: hysteresis.AsymmetricBoucWenParameters
+) -> hysteresis.AsymmetricBoucWenParameters:
     alpha, lag, n = x
     skew = min(0.45 * alpha, max(-0.45 * alpha, model.skew))
     travel = (lag + 1.75 * abs(skew)) / (alpha * _SLOPE - 1.0 - abs(skew))
     shape = travel, _RHO, n
-    return AsymmetricBoucWenParameters(alpha, lag, skew, model.offset, *shape, *shape)
+    return hysteresis.AsymmetricBoucWenParameters(alpha, lag, skew, model.offset, *shape, *shape)
 
 
-def _play_stack(model: PrandtlIshlinskiiParameters) -> Candidates:
+def _play_stack(model: hysteresis.PrandtlIshlinskiiParameters) -> Candidates:
     total = sum(model.weights)
     widest = LONGEST_THRESHOLD / max(model.thresholds[-1], 1e-9)
 
-    def make(x: Sequence[float]) -> PrandtlIshlinskiiParameters:
+    def make(x: Sequence[float]) -> hysteresis.PrandtlIshlinskiiParameters:
         gain, width = x
         weights = [gain * weight for weight in model.weights]
         weights[0] = max(weights[0], SMALLEST_FIRST_WEIGHT)
-        return PrandtlIshlinskiiParameters(
+        return hysteresis.PrandtlIshlinskiiParameters(
             tuple(width * threshold for threshold in model.thresholds),
             tuple(weights),
             model.offset,
@@ -203,15 +195,15 @@ def fit_feedforward(
 
 
 def _inverse(parameters: HysteresisParameters, desired: Array) -> Array:
-    if isinstance(parameters, PrandtlIshlinskiiParameters):
-        return prandtl_ishlinskii_inverse(parameters, desired)
-    return direct_inverse(parameters, desired)
+    if isinstance(parameters, hysteresis.PrandtlIshlinskiiParameters):
+        return hysteresis.prandtl_ishlinskii_inverse(parameters, desired)
+    return hysteresis.direct_inverse(parameters, desired)
 
 
 def _forward(parameters: HysteresisParameters, driver: Array) -> Array:
-    if isinstance(parameters, PrandtlIshlinskiiParameters):
-        return prandtl_ishlinskii_forward(parameters, driver)
-    return forward(parameters, driver)
+    if isinstance(parameters, hysteresis.PrandtlIshlinskiiParameters):
+        return hysteresis.prandtl_ishlinskii_forward(parameters, driver)
+    return hysteresis.forward(parameters, driver)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 
 from endoscope_core.compiled import Array, Flags
 from endoscope_core.errors import InputError, nearest
+from endoscope_core.physics import layout
 from endoscope_core.physics.description import (
     EffectSpec,
     JointParameters,
@@ -21,16 +22,6 @@ from endoscope_core.physics.functions.evaluation import ADDS, FLAGS_OF_FUNCTIONS
 from endoscope_core.physics.functions.term import tabulated
 from endoscope_core.physics.hooks import ON_SAMPLES
 from endoscope_core.physics.kernel import settle, turn_to
-from endoscope_core.physics.layout import (
-    CELLS,
-    FRICTION_PROFILE,
-    HISTORIES,
-    HISTORY,
-    MOTOR_SPEED,
-    NOMINAL_KEYS,
-    SHEATH_ROWS,
-    SLOTS,
-)
 from endoscope_core.physics.sensing import RecordingFaults
 
 
@@ -82,10 +73,10 @@ def pack(plant: PlantDescription) -> tuple[Array, Flags]:
     ValueError.
     """
     names = plant.joint_names()
-    parameters = np.zeros((len(names), SLOTS.parameters))
-    flags = np.zeros((len(names), SLOTS.flags), dtype=np.bool_)
+    parameters = np.zeros((len(names), layout.SLOTS.parameters))
+    flags = np.zeros((len(names), layout.SLOTS.flags), dtype=np.bool_)
     for row, joint in zip(parameters, plant.joints.values(), strict=True):
-        row[: FRICTION_PROFILE + len(joint.friction_profile)] = _nominal(joint)
+        row[: layout.FRICTION_PROFILE + len(joint.friction_profile)] = _nominal(joint)
         for effect in (*CATALOGUE.values(), *FUNCTIONS.values()):
             row[effect.places] = [parameter.typical for parameter in effect.parameters]
     for spec in plant.effects:
@@ -154,7 +145,7 @@ def recording_faults(plant: PlantDescription) -> RecordingFaults:
 
 
 def _nominal(joint: JointParameters) -> list[float]:
-    return [*(getattr(joint, key) for key in NOMINAL_KEYS), *joint.friction_profile]
+    return [*(getattr(joint, key) for key in layout.NOMINAL_KEYS), *joint.friction_profile]
 
 
 def rest_state(
@@ -172,9 +163,9 @@ def rest_state(
     is on its way to its command. Both are zero if not given.
     """
     joints = len(parameters)
-    states = np.zeros((joints, SLOTS.states))
-    histories = np.zeros((joints, HISTORIES, HISTORY))
-    sheaths = np.zeros((joints, SHEATH_ROWS, CELLS + 1))
+    states = np.zeros((joints, layout.SLOTS.states))
+    histories = np.zeros((joints, layout.HISTORIES, layout.HISTORY))
+    sheaths = np.zeros((joints, layout.SHEATH_ROWS, layout.CELLS + 1))
     angles = np.zeros((joints, 1)) if shaft is None else np.reshape(shaft, (joints, -1))
     for j in range(joints):
         joint = (states[j], histories[j], sheaths[j], parameters[j], on[j])
@@ -182,5 +173,5 @@ def rest_state(
         for angle in angles[j, 1:]:
             turn_to(*joint, angle)
     if speed is not None:
-        states[:, MOTOR_SPEED] = speed
+        states[:, layout.MOTOR_SPEED] = speed
     return states, histories, sheaths

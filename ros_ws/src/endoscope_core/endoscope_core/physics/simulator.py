@@ -5,21 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from endoscope_core.physics import layout
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.kernel import run_joints
-from endoscope_core.physics.layout import (
-    IN_COMMAND,
-    IN_MOTOR,
-    INPUTS,
-    OUT_BENDING,
-    OUT_EFFORT,
-    OUT_JOINT,
-    OUT_MOTOR,
-    OUT_MOTOR_SPEED,
-    OUT_TENSION_A,
-    OUT_TENSION_B,
-    OUTPUTS,
-)
 from endoscope_core.physics.packing import pack, rest_state
 
 TICK = 1.0e-3
@@ -102,12 +90,12 @@ class PlantSimulator:
         out = self._readings
         return PlantSample(
             self._ticks * self.tick,
-            out[:, OUT_MOTOR].copy(),
-            out[:, OUT_MOTOR_SPEED].copy(),
-            out[:, OUT_EFFORT].copy(),
-            out[:, OUT_TENSION_A : OUT_TENSION_B + 1].copy(),
-            out[:, OUT_BENDING].copy(),
-            out[:, OUT_JOINT].copy(),
+            out[:, layout.OUT_MOTOR].copy(),
+            out[:, layout.OUT_MOTOR_SPEED].copy(),
+            out[:, layout.OUT_EFFORT].copy(),
+            out[:, layout.OUT_TENSION_A : layout.OUT_TENSION_B + 1].copy(),
+            out[:, layout.OUT_BENDING].copy(),
+            out[:, layout.OUT_JOINT].copy(),
         )
 
     def advance(self, shaft_command: ArrayLike, n_ticks: int = 1) -> PlantSample:
@@ -140,10 +128,10 @@ class PlantSimulator:
         return self.sample
 
     def _advance(self, command: Array, n_ticks: int) -> None:
-        inputs = np.zeros((len(self.joints), n_ticks, INPUTS))
-        inputs[:, :, IN_COMMAND] = command[:, None]
-        inputs[:, :, IN_MOTOR] = np.nan
-        out = np.empty((len(self.joints), n_ticks + 1, OUTPUTS))
+        inputs = np.zeros((len(self.joints), n_ticks, layout.INPUTS))
+        inputs[:, :, layout.IN_COMMAND] = command[:, None]
+        inputs[:, :, layout.IN_MOTOR] = np.nan
+        out = np.empty((len(self.joints), n_ticks + 1, layout.OUTPUTS))
         arrays = (self._states, self._histories, self._sheaths, self._parameters, self._on)
         run_joints(*arrays, inputs, True, self.tick, out)
         self._readings = out[:, -1]
@@ -187,18 +175,18 @@ def simulate(
     parameters, on = pack(plant)
     start = None if start_shaft is None else np.asarray(start_shaft, dtype=float)
     states, histories, sheaths = rest_state(parameters, on, tick, start)
-    inputs = np.zeros((joints, len(command), INPUTS))
-    inputs[:, :, IN_COMMAND] = command.T
-    inputs[:, :, IN_MOTOR] = np.nan
-    out = np.empty((joints, len(command), OUTPUTS))
+    inputs = np.zeros((joints, len(command), layout.INPUTS))
+    inputs[:, :, layout.IN_COMMAND] = command.T
+    inputs[:, :, layout.IN_MOTOR] = np.nan
+    out = np.empty((joints, len(command), layout.OUTPUTS))
     run_joints(states, histories, sheaths, parameters, on, inputs, True, tick, out)
     by_time = out.transpose(1, 0, 2)
     return PlantTrajectory(
         tick * np.arange(len(command), dtype=np.float64),
-        by_time[:, :, OUT_MOTOR],
-        by_time[:, :, OUT_MOTOR_SPEED],
-        by_time[:, :, OUT_EFFORT],
-        by_time[:, :, OUT_TENSION_A : OUT_TENSION_B + 1],
-        by_time[:, :, OUT_BENDING],
-        by_time[:, :, OUT_JOINT],
+        by_time[:, :, layout.OUT_MOTOR],
+        by_time[:, :, layout.OUT_MOTOR_SPEED],
+        by_time[:, :, layout.OUT_EFFORT],
+        by_time[:, :, layout.OUT_TENSION_A : layout.OUT_TENSION_B + 1],
+        by_time[:, :, layout.OUT_BENDING],
+        by_time[:, :, layout.OUT_JOINT],
     )

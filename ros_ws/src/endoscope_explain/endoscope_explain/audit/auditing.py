@@ -5,39 +5,17 @@ from dataclasses import replace
 import numpy as np
 
 from endoscope_core.physics.description import PlantDescription, SensorParameters
+from endoscope_explain.audit import stamps, wrong_samples
 from endoscope_explain.audit.earlier_motion import with_state_at_start
 from endoscope_explain.audit.finding import AuditReport, Finding, Severity
 from endoscope_explain.audit.misreading import as_findings, unlike_the_plant
 from endoscope_explain.audit.plausibility import Comparison, as_meant
-from endoscope_explain.audit.stamps import (
-    clock_skew_from_receipt,
-    find_gaps,
-    gap_findings,
-    in_seconds,
-    missing_in,
-    order_stamps,
-    retimed,
-    silence_findings,
-    skew_finding,
-    stamp_unit_findings,
-    usual_interval,
-)
 from endoscope_explain.audit.standing_still import (
     frozen_findings,
     moves,
     resting_motor_findings,
     with_held_poses,
     without_frozen,
-)
-from endoscope_explain.audit.wrong_samples import (
-    clipped,
-    find_outliers,
-    held,
-    held_before_jump,
-    held_findings,
-    motor_travel,
-    outlier_finding,
-    saturation_finding,
 )
 from endoscope_explain.recording import (
     LEAST_DURATION_S,
@@ -56,8 +34,8 @@ def audit_recording(recording: Recording, plant: PlantDescription) -> AuditRepor
     """Find what is wrong with a recording, and correct it to what it must mean where it can be."""
     findings: list[Finding] = []
     recording = _on_ordered_stamps(recording, findings)
-    in_other_units = stamp_unit_findings(recording, plant.sensors)
-    recording = _on_one_clock(in_seconds(recording, in_other_units), findings)
+    in_other_units = stamps.stamp_unit_findings(recording, plant.sensors)
+    recording = _on_one_clock(stamps.in_seconds(recording, in_other_units), findings)
     over_all = ((0.0, recording.duration),)
     findings += [replace(f, intervals=over_all) for f in in_other_units]
     recording = _without_commandless_times(recording, findings)
@@ -81,7 +59,7 @@ def _on_ordered_stamps(recording: Recording, findings: list[Finding]) -> Recordi
     cleaned = {}
     seen = set()
     for name, series in {'command': recording.command, **recording.measured()}.items():
-        cleaned[name], found = order_stamps(series, joint)
+        cleaned[name], found = stamps.order_stamps(series, joint)
         # Position, velocity and effort of the motor come in the same messages.
         if series.topic not in seen:
             findings += found
@@ -119,11 +97,13 @@ def _as_meant(
 
 def _on_one_clock(recording: Recording, findings: list[Finding]) -> Recording:
     every = {'command': recording.command, **recording.measured()}
-    skews = clock_skew_from_receipt({s.topic: s for s in every.values()})
+    skews = stamps.clock_skew_from_receipt({s.topic: s for s in every.values()})
     for topic, skew in skews.items():
-        findings.append(skew_finding(topic, recording.joints[0], skew, recording.duration))
+        findings.append(stamps.skew_finding(topic, recording.joints[0], skew, recording.duration))
     changed = {
-        name: retimed(s, skews[s.topic].value) for name, s in every.items() if s.topic in skews
+        name: stamps.retimed(s, skews[s.topic].value)
+        for name, s in every.items()
+        if s.topic in skews
     }
     return recording.with_series(changed)
 
@@ -132,21 +112,21 @@ def _without_commandless_times(recording: Recording, findings: list[Finding]) ->
     every = {s.topic: s for s in (recording.command, *recording.measured().values())}
     start = min(float(s.time[0]) for s in every.values())
     end = max(float(s.time[-1]) for s in every.values())
-    gaps = {topic: find_gaps(s, start, end) for topic, s in every.items()}
-    intervals = {topic: usual_interval(s.time) for topic, s in every.items()}
+    gaps = {topic: stamps.find_gaps(s, start, end) for topic, s in every.items()}
+    intervals = {topic: stamps.usual_interval(s.time) for topic, s in every.items()}
     # A command is in force until the next one: a console that pauses, or whose clutch is released,
     # leaves nothing out. Only where the command has moved on meanwhile some of it is missing, and
     # not even there if the motors have rested: then it began again from another pose.
-    lost = missing_in(recording.command, gaps[recording.command.topic])
+    lost = stamps.missing_in(recording.command, gaps[recording.command.topic])
     blind = [
         (a, b)
         for a, b in _unknown_command(recording.command, lost, end)
         if not _rests(recording.shaft_position, a + SETTLING_S, b)
     ]
     gaps[recording.command.topic] = tuple(blind)
-    missing = {topic: missing_in(every[topic], found) for topic, found in gaps.items()}
-    findings += gap_findings(missing, intervals, recording.joints[0])
-    findings += silence_findings(gaps, missing, recording.joints[0])
+    missing = {topic: stamps.missing_in(every[topic], found) for topic, found in gaps.items()}
+    findings += stamps.gap_findings(missing, intervals, recording.joints[0])
+    findings += stamps.silence_findings(gaps, missing, recording.joints[0])
     if not blind:
         return recording
     changed = {}
@@ -191,11 +171,11 @@ def _audited_motor(
         return recording
     held_at = np.zeros(position.valid.shape, bool)
     for j, joint in enumerate(recording.joints):
-        repeated = held_before_jump(
+        repeated = wrong_samples.held_before_jump(
             position.time, position.values[:, j], 2.0 * np.pi / sensors.encoder_counts
         )
         signal = signal_name('shaft_position', joint)
-        findings += held_findings(joint, signal, position.time, repeated)
+        findings += wrong_samples.held_findings(joint, signal, position.time, repeated)
         held_at[:, j] = repeated
     motor = {n: s for n, s in recording.measured().items() if s.topic == position.topic}
     # Position, velocity and effort of the motor come in the same messages.
@@ -209,18 +189,20 @@ def _audited_tension(
     if series is None:
         findings.append(_no_load_cells(recording))
         return None
-    interval = usual_interval(series.time)
+    interval = stamps.usual_interval(series.time)
     wrong = np.zeros(series.valid.shape, bool)
     for j, joint in enumerate(recording.joints):
         for wire in range(2):
             signal = signal_name('tension', joint, wire)
             values, seen = series.values[:, j, wire], series.valid[:, j, wire]
-            pile = clipped(values, sensors.load_cell_noise, sensors.load_cell_resolution)
+            pile = wrong_samples.clipped(
+                values, sensors.load_cell_noise, sensors.load_cell_resolution
+            )
             at_limit = np.zeros(len(values), bool)
             if pile is not None and (seen & pile[0]).any():
                 at_limit, limit = seen & pile[0], pile[1]
                 findings.append(
-                    saturation_finding(
+                    wrong_samples.saturation_finding(
                         joint,
                         signal,
                         series.time,
@@ -230,12 +212,12 @@ def _audited_tension(
                         wire,
                     )
                 )
-            repeated, _ = held(
+            repeated, _ = wrong_samples.held(
                 values, sensors.load_cell_noise, sensors.load_cell_resolution, interval
             )
             # A reading without noise, as of a simulation, may well repeat itself.
             repeated &= seen & ~at_limit & noisy
-            findings += held_findings(joint, signal, series.time, repeated)
+            findings += wrong_samples.held_findings(joint, signal, series.time, repeated)
             wrong[:, j, wire] = at_limit | repeated
     return series.without(wrong)
 
@@ -260,22 +242,22 @@ def _audited_bending(
     recording: Recording, plant: PlantDescription, findings: list[Finding], noisy: bool
 ) -> Series:
     series = recording.bending
-    interval = usual_interval(series.time)
+    interval = stamps.usual_interval(series.time)
     motor = recording.shaft_position or recording.command
     isolated = np.zeros(series.valid.shape, bool)
     wrong = np.zeros(series.valid.shape, bool)
     for j, joint in enumerate(recording.joints):
         signal = signal_name('bending', joint)
         values = series.values[:, j]
-        repeated, _ = held(values, plant.sensors.tracker_noise, 0.0, interval)
+        repeated, _ = wrong_samples.held(values, plant.sensors.tracker_noise, 0.0, interval)
         repeated &= series.valid[:, j] & noisy
-        findings += held_findings(joint, signal, series.time, repeated)
+        findings += wrong_samples.held_findings(joint, signal, series.time, repeated)
         asked = motor.values[:, j] / recording.gear
-        travel = motor_travel(series.time, motor.time, asked, 3.0 * interval)
-        spikes = find_outliers(values, plant.sensors.tracker_noise, travel)
+        travel = wrong_samples.motor_travel(series.time, motor.time, asked, 3.0 * interval)
+        spikes = wrong_samples.find_outliers(values, plant.sensors.tracker_noise, travel)
         wrong[:, j] = repeated
         isolated[:, j] = spikes
     if isolated.any():
-        findings.append(outlier_finding(recording.joints, series, isolated))
+        findings.append(wrong_samples.outlier_finding(recording.joints, series, isolated))
     # All angles come from one pose.
     return series.without(wrong | isolated.any(axis=1, keepdims=True))

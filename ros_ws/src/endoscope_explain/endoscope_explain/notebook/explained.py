@@ -15,18 +15,9 @@ from endoscope_explain.case import ExplainedCase
 from endoscope_explain.explanation import NamedEffect, NominalEstimate
 from endoscope_explain.notebook.signals import OUTSIDE, embedded, html_table
 from endoscope_explain.observe.predicted_signals import RecordedView, view
+from endoscope_explain.report import sentences
 from endoscope_explain.report.html_page import html_page
 from endoscope_explain.report.numbers import PLANTS, Shown, numbers_of
-from endoscope_explain.report.sentences import (
-    HEADLINES,
-    fits_table,
-    label,
-    next_step,
-    not_shown,
-    reservations,
-    told,
-    verdict_sentence,
-)
 from endoscope_explain.report.writing import report_mapping, write_report
 
 if TYPE_CHECKING:
@@ -137,7 +128,7 @@ class Explained:
     def _effect_rows(self) -> list[tuple[str, ...]]:
         rows: list[tuple[str, ...]] = []
         for effect in self.effects:
-            named = (label(effect), effect.joint, ', '.join(effect.alternatives) or '-')
+            named = (sentences.label(effect), effect.joint, ', '.join(effect.alternatives) or '-')
             for one in numbers_of(effect) or [Shown('-', '-', '-', '-', '-')]:
                 rows.append((*named, one.name, one.value, f'{one.low} to {one.high}', one.unit))
                 named = ('', '', '')
@@ -145,24 +136,25 @@ class Explained:
 
     def __repr__(self) -> str:
         name = self.case.recording.name
-        return f'{name}: {self.verdict}. {HEADLINES[self.case.verdict]}.\n{told(self.case)}'
+        headline = sentences.HEADLINES[self.case.verdict]
+        return f'{name}: {self.verdict}. {headline}.\n{sentences.told(self.case)}'
 
     def _repr_html_(self) -> str:
         name = escape(self.case.recording.name)
         parts = [
-            f'<p><b>{name}: {HEADLINES[self.case.verdict]}</b> ({self.verdict})</p>',
-            f'<p>{escape(verdict_sentence(self.case))}</p>',
+            f'<p><b>{name}: {sentences.HEADLINES[self.case.verdict]}</b> ({self.verdict})</p>',
+            f'<p>{escape(sentences.verdict_sentence(self.case))}</p>',
             *(
                 f'<p>{escape(said)}</p>'
-                for said in (*reservations(self.case), *not_shown(self.case))
+                for said in (*sentences.reservations(self.case), *sentences.not_shown(self.case))
             ),
         ]
         if self.effects:
             parts.append(html_table(_EFFECTS, self._effect_rows()))
-        fits = fits_table(self.case)
+        fits = sentences.fits_table(self.case)
         if fits:
             parts.append('<p>rmse / noise, on samples held out</p>')
             parts.append(html_table(*fits))
             parts.append(embedded(self.plot()))
-        parts.append(f'<p>{escape(next_step(self.case))}</p>')
+        parts.append(f'<p>{escape(sentences.next_step(self.case))}</p>')
         return ''.join(parts)

@@ -19,18 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from endoscope_core.physics import layout
 from endoscope_core.physics.description import PlantDescription, SensorParameters
-from endoscope_core.physics.layout import (
-    IN_COMMAND,
-    IN_MOTOR,
-    IN_OTHER_JOINT,
-    INPUTS,
-    OUT_BENDING,
-    OUT_EFFORT,
-    OUT_MOTOR,
-    OUT_TENSION_A,
-    OUT_TENSION_B,
-)
 from endoscope_core.physics.on_stamps import hold_on_ticks
 from endoscope_core.physics.simulator import TICK
 from endoscope_explain.recording import QUANTITY_UNITS, Recording, Series, signal_name
@@ -180,14 +170,14 @@ class JointObservation:
         ticks = -(-self.inputs.shape[1] // factor) + 1
         missing = ticks * factor - self.inputs.shape[1]
         padded = np.concatenate([self.inputs, np.repeat(self.inputs[:, -1:], missing, axis=1)], 1)
-        inputs = padded.reshape(1, ticks, factor, INPUTS).mean(axis=2)
+        inputs = padded.reshape(1, ticks, factor, layout.INPUTS).mean(axis=2)
         channels = tuple(replace(c, stamps=c.stamps.coarser(factor)) for c in self.channels)
         return replace(self, inputs=inputs, channels=channels, tick=factor * self.tick)
 
     def beside(self, other: Array) -> 'JointObservation':
         """The same readings with the other joint's bending angle (N,) in rad on ticks."""
         inputs = self.inputs.copy()
-        inputs[0, :, IN_OTHER_JOINT] = other
+        inputs[0, :, layout.IN_OTHER_JOINT] = other
         return replace(self, inputs=inputs)
 
     def slices(self) -> tuple[slice, ...]:
@@ -205,11 +195,11 @@ def observe(recording: Recording, plant: PlantDescription) -> tuple[JointObserva
     for j, joint in enumerate(recording.joints):
         if joint not in plant.joints:
             continue
-        inputs = np.zeros((1, ticks, INPUTS))
-        inputs[0, :, IN_COMMAND] = held[:, j]
-        inputs[0, :, IN_MOTOR] = np.nan
+        inputs = np.zeros((1, ticks, layout.INPUTS))
+        inputs[0, :, layout.IN_COMMAND] = held[:, j]
+        inputs[0, :, layout.IN_MOTOR] = np.nan
         channels = _channels(recording, j, joint, plant.sensors, begin, ticks)
-        start = inputs[0, :1, IN_COMMAND] if recording.start is None else recording.start[j]
+        start = inputs[0, :1, layout.IN_COMMAND] if recording.start is None else recording.start[j]
         speed = 0.0 if recording.start_speed is None else float(recording.start_speed[j])
         joints.append(JointObservation(joint, inputs, start, channels, start_speed=speed))
     return tuple(joints)
@@ -225,11 +215,11 @@ def _channels(
 ) -> tuple[Channel, ...]:
     encoder_step = 2.0 * pi / sensors.encoder_counts
     plan = (
-        ('shaft_position', 0, OUT_MOTOR, 0.0, encoder_step),
-        ('shaft_effort', 0, OUT_EFFORT, sensors.effort_noise, sensors.effort_resolution),
-        ('tension', 0, OUT_TENSION_A, sensors.load_cell_noise, sensors.load_cell_resolution),
-        ('tension', 1, OUT_TENSION_B, sensors.load_cell_noise, sensors.load_cell_resolution),
-        ('bending', 0, OUT_BENDING, sensors.tracker_noise, 0.0),
+        ('shaft_position', 0, layout.OUT_MOTOR, 0.0, encoder_step),
+        ('shaft_effort', 0, layout.OUT_EFFORT, sensors.effort_noise, sensors.effort_resolution),
+        ('tension', 0, layout.OUT_TENSION_A, sensors.load_cell_noise, sensors.load_cell_resolution),
+        ('tension', 1, layout.OUT_TENSION_B, sensors.load_cell_noise, sensors.load_cell_resolution),
+        ('bending', 0, layout.OUT_BENDING, sensors.tracker_noise, 0.0),
     )
     measured = recording.measured()
     channels = []

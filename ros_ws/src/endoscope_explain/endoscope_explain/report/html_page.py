@@ -15,39 +15,14 @@ from endoscope_explain.fit.evidence import slips
 from endoscope_explain.fit.free_parameters import tolerance
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.observe.predicted_signals import RecordedView, view
+from endoscope_explain.report import numbers, sentences
 from endoscope_explain.report.figures import experiment_figure, ladder_figure, unknown_figure
-from endoscope_explain.report.numbers import (
-    MODELS,
-    PLANTS,
-    digits,
-    in_degrees,
-    judged,
-    moving_joints,
-    numbers_of,
-    rmse,
-    shown,
-)
 from endoscope_explain.report.passage import (
     passage_figure,
     state_of,
     telling_passage,
     telling_signals,
     timeline_figure,
-)
-from endoscope_explain.report.sentences import (
-    EVIDENCE,
-    HEADLINES,
-    LEAST_SHARE,
-    before_and_after,
-    fitting_sentences,
-    how_sure,
-    label,
-    next_step,
-    physics_of,
-    plain,
-    reservations,
-    verdict_sentence,
-    what_is_known,
 )
 from endoscope_explain.search.repetition import motion_repeats
 
@@ -87,7 +62,7 @@ def html_page(case: ExplainedCase) -> str:
     joint = _joint_of_interest(case, recorded)
     found = explanation.unknown
     unknown = found if found is not None and found.helps else None
-    ladder = judged(case, case.ladder)
+    ladder = numbers.judged(case, case.ladder)
     environment = Environment(
         loader=PackageLoader('endoscope_explain', 'report/templates'),
         autoescape=True,
@@ -95,39 +70,41 @@ def html_page(case: ExplainedCase) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters.update(digits=digits, plain=plain)
+    environment.filters.update(digits=numbers.digits, plain=sentences.plain)
     return environment.get_template('report.html.j2').render(
         case=case,
         head=zoomable.head(),
         scripts=zoomable.scripts(),
-        headline=HEADLINES[case.verdict],
+        headline=sentences.HEADLINES[case.verdict],
         colour=COLOURS[case.verdict],
-        sentence=verdict_sentence(case),
-        change=before_and_after(case),
-        reservations=reservations(case),
+        sentence=sentences.verdict_sentence(case),
+        change=sentences.before_and_after(case),
+        reservations=sentences.reservations(case),
         chain=CHAIN,
         guilty=_guilty(case),
         cut=_cut(case, joint) if case.places else '',
         effects_title=_effects_title(case),
-        numbers_of=numbers_of,
-        label=label,
-        how_sure=how_sure,
-        physics_of=physics_of,
-        meaning=EVIDENCE,
+        numbers_of=numbers.numbers_of,
+        label=sentences.label,
+        how_sure=sentences.how_sure,
+        physics_of=sentences.physics_of,
+        meaning=sentences.EVIDENCE,
         joint=joint,
         slipping=[o.joint for o in recorded.observations if slips(o)],
-        plants=[PLANTS[name] for name in recorded.of_joint(joint)[0].predicted],
+        plants=[numbers.PLANTS[name] for name in recorded.of_joint(joint)[0].predicted],
         unknown=unknown,
-        formula=unknown is not None and unknown.formula_share >= LEAST_SHARE,
+        formula=unknown is not None and unknown.formula_share >= sentences.LEAST_SHARE,
         drawings=_drawings(case, recorded, joint, ladder),
         tables=_tables(case, ladder),
         parameters=_parameters(case),
-        fitting=fitting_sentences(case),
+        fitting=sentences.fitting_sentences(case),
         tried=_tried(case),
         not_refitted=[_not_refitted(case, o) for o in recorded.observations],
-        next_step=next_step(case),
+        next_step=sentences.next_step(case),
         experiment_file=EXPERIMENT_FILE,
-        written='improved' if case.effects or unknown else PLANTS[list(_plants(explanation))[-1]],
+        written='improved'
+        if case.effects or unknown
+        else numbers.PLANTS[list(_plants(explanation))[-1]],
     )
 
 
@@ -169,7 +146,7 @@ def _drawings(
         mistaken = bool(case.audit.mistakes())
         shaded = tuple(p for p in case.places if p.shares or not mistaken)
         drawn['timeline'] = timeline_figure(recorded, command, joint, shaded)
-        if joint in moving_joints(case.recording):
+        if joint in numbers.moving_joints(case.recording):
             views = telling_signals(recorded, joint)
             passage = drawn['passage'] = telling_passage(views)
             over = state_of(recorded, joint, command, _argument(case, joint))
@@ -202,7 +179,7 @@ def _guilty(case: ExplainedCase) -> dict[str, list[str]]:
     """What was found in each stage of the chain."""
     guilty: dict[str, list[str]] = {}
     for effect in case.effects:
-        guilty.setdefault(effect.stage, []).append(f'{label(effect)} ({effect.joint})')
+        guilty.setdefault(effect.stage, []).append(f'{sentences.label(effect)} ({effect.joint})')
     mistaken = case.audit.mistakes()
     places = case.places[: len(mistaken)] if guilty else case.places
     for index, place in enumerate(places):
@@ -227,11 +204,11 @@ def _cut(case: ExplainedCase, joint: str) -> str:
 
 def _tables(case: ExplainedCase, ladder: Ladder) -> list[dict[str, Any]]:
     titled = {'held-out blocks of this recording': ladder}
-    titled[f'second recording: {case.validation_name}'] = judged(case, case.validation)
+    titled[f'second recording: {case.validation_name}'] = numbers.judged(case, case.validation)
     return [
         {
             'title': title,
-            'models': [MODELS[name] for name in models],
+            'models': [numbers.MODELS[name] for name in models],
             'rows': [_row(signal, models) for signal in next(iter(models.values()))],
         }
         for title, models in titled.items()
@@ -243,10 +220,10 @@ def _row(signal: str, models: Ladder) -> dict[str, Any]:
     """What each model leaves of a signal; empty where one does not predict it."""
     fits = [fits.get(signal) for fits in models.values()]
     least = min(f.rmse for f in fits if f is not None)
-    texts = [('', '') if f is None else rmse(signal, f) for f in fits]
+    texts = [('', '') if f is None else numbers.rmse(signal, f) for f in fits]
     cells = [
         {
-            'text': f'{text} ({digits(f.ratio)})' if f else '',
+            'text': f'{text} ({numbers.digits(f.ratio)})' if f else '',
             'best': f is not None and f.rmse <= 1.02 * least,
         }
         for f, (text, _) in zip(fits, texts, strict=True)
@@ -259,15 +236,16 @@ def _parameters(case: ExplainedCase) -> list[dict[str, Any]]:
     rows = []
     for joint, estimates in case.explanation.parameters.items():
         for name, e in estimates.items():
+            _, _, factor = numbers.in_degrees(name, e.unit)
             low, high = tolerance(name, e.nominal, case.band)
-            _, _, factor = in_degrees(name, e.unit)
+            reach = f'{numbers.digits(factor * low)} … {numbers.digits(factor * high)}'
             rows.append(
                 {
                     'joint': joint,
-                    'number': shown(name, e),
-                    'known': what_is_known(e),
-                    'described': digits(factor * e.nominal),
-                    'tolerance': f'{digits(factor * low)} … {digits(factor * high)}',
+                    'number': numbers.shown(name, e),
+                    'known': sentences.what_is_known(e),
+                    'described': numbers.digits(factor * e.nominal),
+                    'tolerance': reach,
                     'outside': not low <= e.value <= high,
                 }
             )

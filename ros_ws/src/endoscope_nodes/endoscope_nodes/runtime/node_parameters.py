@@ -6,20 +6,7 @@ Nodes declare them, ``--help`` and the reference list them; nothing here needs R
 import math
 from dataclasses import dataclass
 
-from endoscope_core.choices import (
-    ADAPTIVE,
-    BY_CLASS,
-    CALIBRATION_MOTIONS,
-    FEEDBACK_LAWS,
-    LOAD_CELL_DEVICES,
-    MODES,
-    MOTOR_DEVICES,
-    PLAYED_MOTIONS,
-    SELECTIONS,
-    SINUSOID,
-    SOURCES,
-    TRACKER_DEVICES,
-)
+from endoscope_core import choices
 from endoscope_nodes import names
 from endoscope_nodes.runtime.parameters import parameter
 from endoscope_nodes.topics import RECORDED
@@ -79,7 +66,7 @@ class MotorDriverParameters:
     """Parameters of the motor driver."""
 
     device: str = parameter(
-        '', 'what is driven; empty for what the rig file says', choices=('', *MOTOR_DEVICES)
+        '', 'what is driven; empty for what the rig file says', choices=('', *choices.MOTOR_DEVICES)
     )
 
 
@@ -132,7 +119,9 @@ class LoadCellsParameters:
     """Parameters of the load cells."""
 
     device: str = parameter(
-        '', 'what is read; empty for what the rig file says', choices=('', *LOAD_CELL_DEVICES)
+        '',
+        'what is read; empty for what the rig file says',
+        choices=('', *choices.LOAD_CELL_DEVICES),
     )
     port: str = parameter('', 'serial port of a modbus_rtu device, HOST:PORT of a modbus_tcp one')
     calibration_file: str = parameter(
@@ -150,7 +139,7 @@ class EmTrackerParameters:
     """Parameters of the EM tracker."""
 
     device: str = parameter(
-        '', 'what is read; empty for what the rig file says', choices=('', *TRACKER_DEVICES)
+        '', 'what is read; empty for what the rig file says', choices=('', *choices.TRACKER_DEVICES)
     )
     port: str = parameter('', 'serial port of an aurora')
     tool: int = parameter(
@@ -190,9 +179,9 @@ class CalibrationParameters:
         'the project',
     )
     motion: str = parameter(
-        SINUSOID,
+        choices.SINUSOID,
         "motion by which the tube is judged: the first paper's sinusoid of 9 s, or one of 3 s",
-        choices=CALIBRATION_MOTIONS,
+        choices=choices.CALIBRATION_MOTIONS,
     )
     identify_plant: bool = parameter(
         True,
@@ -213,14 +202,14 @@ class CompensatorParameters:
     mode: str = parameter(
         'bouc_wen',
         'feed-forward model in force once its parameters are known',
-        choices=MODES,
+        choices=choices.MODES,
         dynamic=True,
     )
     selected_by: str = parameter(
-        BY_CLASS,
+        choices.BY_CLASS,
         'what of a calibration selects the parameters: the hysteresis class, the backlash size in '
         'the updated table, or (physical modes) the plant that it identified',
-        choices=SELECTIONS,
+        choices=choices.SELECTIONS,
         dynamic=True,
     )
     table: str = parameter(
@@ -250,10 +239,10 @@ class ControllerParameters:
         True, 'whether to learn and correct while the tracker is fresh', dynamic=True
     )
     law: str = parameter(
-        ADAPTIVE,
+        choices.ADAPTIVE,
         "how to learn: the second paper's adaptive law, or recursive least squares; a change "
         'takes place once the correction has faded out',
-        choices=FEEDBACK_LAWS,
+        choices=choices.FEEDBACK_LAWS,
         dynamic=True,
     )
     tracker_timeout: float = parameter(
@@ -275,11 +264,11 @@ class ConsoleParameters:
     source: str = parameter(
         'none',
         'where commands come from; setting it restarts a motion or file',
-        choices=SOURCES,
+        choices=choices.SOURCES,
         dynamic=True,
     )
     motion: str = parameter(
-        'periodic', 'motion that is played', choices=PLAYED_MOTIONS, dynamic=True
+        'periodic', 'motion that is played', choices=choices.PLAYED_MOTIONS, dynamic=True
     )
     joints: tuple[str, ...] = parameter(
         names.JOINTS, 'joints that the motion moves', choices=names.JOINTS, dynamic=True
