@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from endoscope_core.atomic_output import atomic_directory, require_free_directory
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import EndoscopeError, InputError
 from endoscope_core.workers import worker_pool
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
@@ -33,14 +33,6 @@ SUMMARY = (
 """Columns of the summary."""
 
 Say = Callable[[str], None]
-
-
-class ClusterError(EndoscopeError, ConnectionError):
-    """The Dask cluster cannot be reached."""
-
-
-class TogetherError(EndoscopeError, ValueError):
-    """What was asked for several bags does not go together."""
 
 
 @dataclass(frozen=True)
@@ -245,7 +237,7 @@ def _prepared(
     """Sources of which each can be explained for itself, after all of several were read."""
     if same_physics:
         if any(one.baseline is not None for one in sources):
-            raise TogetherError('same physics and a baseline are mutually exclusive')
+            raise InputError('same physics and a baseline are mutually exclusive')
         all_given = physics_of_all(sources, jobs, tell or (lambda _: None))
         return [replace(o, given=g) for o, g in zip(sources, all_given, strict=True)]
     if len(sources) > 1:
@@ -270,7 +262,7 @@ def _on_dask(sources: Sequence[Sources], address: str) -> Iterator[tuple[int, Re
     try:
         client = Client(address, timeout=5)
     except (OSError, ValueError) as error:
-        raise ClusterError(f'no Dask scheduler at {address}: {error}') from error
+        raise EndoscopeError(f'no Dask scheduler at {address}: {error}') from error
     with client:
         # A report is a pure function of its sources, but nothing is gained by keeping results.
         futures = {client.submit(explain_one, one, pure=False): i for i, one in enumerate(sources)}

@@ -80,10 +80,6 @@ class Inputs:
         return self.sources.plant.of_joints(self.audit.recording.joints)
 
 
-class JointsDifferError(BagError):
-    """A second recording lacks a joint of the first."""
-
-
 def read_inputs(sources: Sources) -> Inputs:
     """Read and audit all recordings of a case; BagError, with its name, if one cannot be used."""
 
@@ -101,7 +97,7 @@ def read_inputs(sources: Sources) -> Inputs:
             return None
         other = read(path, plant)
         if other.joints != raw.joints:
-            raise JointsDifferError(
+            raise BagError(
                 f'{path}: has {", ".join(other.joints)}, but {sources.bag} has '
                 f'{", ".join(raw.joints)}'
             )

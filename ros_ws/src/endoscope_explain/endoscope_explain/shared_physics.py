@@ -4,12 +4,13 @@ from collections.abc import Callable, Mapping, Sequence
 
 from threadpoolctl import threadpool_limits
 
+from endoscope_bags.errors import BagError
 from endoscope_core.physics.effects import describe
 from endoscope_explain.decide.given_physics import GivenJoints, GivenPhysics, without_recording
 from endoscope_explain.fit.nominal import ReferenceFits, with_references
 from endoscope_explain.fit.pooled import judged_alone
 from endoscope_explain.observe.observation import observe, with_held_noise
-from endoscope_explain.pipeline import JointsDifferError, Sources, read_inputs
+from endoscope_explain.pipeline import Sources, read_inputs
 from endoscope_explain.search.levels import search
 
 
@@ -32,7 +33,7 @@ def physics_of_all(
             )
             joints = recording.joints
             if recordings and set(joints) != set(recordings[0]):
-                raise JointsDifferError(
+                raise BagError(
                     f'{one.bag}: has {", ".join(joints)}, but {sources[0].bag} has '
                     f'{", ".join(recordings[0])}'
                 )
