@@ -66,7 +66,7 @@ STIFFNESS = Hook('stiffness', Fold.FACTORS, 'p, x, tension')
 """Factor on a wire's tangent stiffness at a mean tension in N."""
 LENGTH = Hook('length', Fold.TERMS, 'p, x, wire, time')
 """What has been added to the length of wire 0 or 1 along the sheath, m."""
-JOINT_FRICTION = Hook('joint_friction', Fold.FACTORS, 'p, x')
+JOINT_FRICTION_FACTOR = Hook('joint_friction_factor', Fold.FACTORS, 'p, x')
 """Factor on the joint's friction in the tick that begins."""
 END_LENGTH = Hook('end_length', Fold.TERMS, 'p, x, other')
 """What the other joint's angle in rad adds to the displacement of the positive wire at the joint in
@@ -98,7 +98,7 @@ HOOKS = (
     FILM_DRAG,
     STIFFNESS,
     LENGTH,
-    JOINT_FRICTION,
+    JOINT_FRICTION_FACTOR,
     END_LENGTH,
     LOAD,
     TIP_ANGLE,

@@ -13,7 +13,7 @@ from endoscope_core.physics import hooks
 from endoscope_core.physics.folds import acting, folded
 from endoscope_core.physics.layout import (
     ELEMENTS,
-    END_LENGTH,
+    EXTRA_END_LENGTH,
     FILM,
     FLOOR,
     JOINT,
@@ -35,7 +35,7 @@ from endoscope_core.physics.sheath import JOINT_END, mean_tension, move, moved
 
 added_moment = folded(hooks.LOAD)
 film_drag = folded(hooks.FILM_DRAG)
-friction_factor = folded(hooks.JOINT_FRICTION)
+friction_factor = folded(hooks.JOINT_FRICTION_FACTOR)
 end_length = folded(hooks.END_LENGTH)
 stiffness_factor, stiffness_varies = folded(hooks.STIFFNESS), acting(hooks.STIFFNESS)
 
@@ -166,10 +166,10 @@ def bend(
     k_b = secant_stiffness(x, WIRE_B, table, p, on, ahead)
     # w(Phi) = +-(r q - what the other joint adds).
     length = end_length(on, p, x, q_other)
-    if length != x[END_LENGTH]:
-        move(x, WIRE_A, table, JOINT_END, k_a * (length - x[END_LENGTH]), x[FLOOR])
-        move(x, WIRE_B, table, JOINT_END, k_b * (x[END_LENGTH] - length), x[FLOOR])
-        x[END_LENGTH] = length
+    if length != x[EXTRA_END_LENGTH]:
+        move(x, WIRE_A, table, JOINT_END, k_a * (length - x[EXTRA_END_LENGTH]), x[FLOOR])
+        move(x, WIRE_B, table, JOINT_END, k_b * (x[EXTRA_END_LENGTH] - length), x[FLOOR])
+        x[EXTRA_END_LENGTH] = length
     film = film_drag(on, p, x, abs(x[SLIDING_SPEED]))
     tau_f = p[JOINT_FRICTION] * friction_factor(on, p, x)
     dq = _step(x, table, p, on, _Tick(k_a, k_b, film, tau_f, w, q_other, time, tick))

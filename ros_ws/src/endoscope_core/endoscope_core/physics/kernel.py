@@ -130,7 +130,8 @@ def settle(
     _lay_out(sheath, p)
     # Load-independent friction f0 per unit length: the same law for T + f0 / mu'.
     x[FLOOR] = friction_floor(on, p, x)
-    # Friction that depends on the tension has to be known before the tension is.
+    # A function of the mean tension may act on the exponent, which has to be known before the
+    # tension is.
     x[MEAN_TENSION] = p[PRETENSION]
     _shape(x, sheath, p, on, exponent_factor(on, p, x, 0.0, -0.5 * tick, tick))
     table = sheath[:TABLE_ROWS]
@@ -179,6 +180,8 @@ def _keep_up(x: Array, table: Array, p: Array, on: Flags, tick: float) -> None:
     """Let the states follow that only functions depend on; a tick of zero settles them."""
     load_a = mean_tension(x, WIRE_A, table) - x[FLOOR]
     load_b = mean_tension(x, WIRE_B, table) - x[FLOOR]
+    # Read by functions at places of the tension alone (`both_tensions`): the nominal physics has
+    # each wire's own tension, node by node.
     x[MEAN_TENSION] = 0.5 * (load_a + load_b)
     x[TENSION_DIFFERENCE] = load_a - load_b
     x[PATH] += abs(x[SLIDING_SPEED]) * tick

@@ -107,7 +107,7 @@ FLOOR = SLOTS.state_block()
 """What load-independent friction adds to every node's tension, N."""
 TRANSITION = SLOTS.state_block(4)
 """Exact transition of the servo over a tick."""
-END_LENGTH = SLOTS.state_block()
+EXTRA_END_LENGTH = SLOTS.state_block()
 """What the other joint has added to the displacement of the positive wire at the joint, m."""
 FILM = SLOTS.state_block(2)
 """Viscous drag on each wire, half of it at either end, N."""

@@ -18,7 +18,7 @@ from endoscope_core.physics.hooks import (
     END_LENGTH,
     EXPONENT,
     FILM_DRAG,
-    JOINT_FRICTION,
+    JOINT_FRICTION_FACTOR,
     LENGTH,
     LOAD,
     LOAD_CELL,
@@ -374,9 +374,9 @@ def _joint() -> None:
     )  # fmt: skip
     place('load_of_other_angle', of, LOAD, what, OTHER_ANGLE, 'N m', 0.1, at='other')
     what = "Factor on the joint's friction"
-    place('joint_friction_of_angle', of, JOINT_FRICTION, what, ANGLE, '-', 3.0, at=own_angle)
+    place('joint_friction_of_angle', of, JOINT_FRICTION_FACTOR, what, ANGLE, '-', 3.0, at=own_angle)
     place(
-        'joint_friction_of_time', of, JOINT_FRICTION, what, TIME, '-', 3.0, at=now,
+        'joint_friction_of_time', of, JOINT_FRICTION_FACTOR, what, TIME, '-', 3.0, at=now,
         depends_on_time=True,
     )  # fmt: skip
 
