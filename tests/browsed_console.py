@@ -94,7 +94,7 @@ class BrowsedConsole:
 
     @property
     def now_ns(self) -> int:
-        return self.graph.conductor.now_ns
+        return self.graph.clock.now_ns
 
     def moved(self, since_ns: int) -> float:
         """How far the goals of the motors have been moved since then, rad."""

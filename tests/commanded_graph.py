@@ -34,7 +34,7 @@ class Sender:
 
     def send(self, position, session=None, ahead_ns=0, **fields):
         message = JointState(name=list(self._names), position=list(position))
-        stamp = self._graph.conductor.now_ns + ahead_ns
+        stamp = self._graph.clock.now_ns + ahead_ns
         message.header.stamp = Time(nanoseconds=stamp).to_msg()
         message.header.frame_id = self._graph.session if session is None else session
         for field, value in fields.items():
@@ -42,8 +42,8 @@ class Sender:
         self.publisher.publish(message)
 
 
-class ForeignConsole(Sender):
-    """Writes ``slave/servo_jp`` while the console's source is ``none``."""
+class ForeignMaster(Sender):
+    """Writes ``slave/servo_jp`` while the master's source is ``none``."""
 
     def __init__(self, graph):
         super().__init__(graph, SLAVE_COMMAND)
@@ -139,20 +139,20 @@ def run(**arguments):
 
 @pytest.fixture(scope='module')
 def foreign():
-    """A graph whose console is silent, for tests that leave it as they found it."""
+    """A graph whose master is silent, for tests that leave it as they found it."""
     with run() as graph:
         yield graph
 
 
 @pytest.fixture
-def console(foreign):
-    """The foreign console, in a session of its own and at the pose of then."""
+def master(foreign):
+    """The foreign master, in a session of its own and at the pose of then."""
     foreign.command('disable')
     foreign.advance(0.5)
     foreign.enable()
-    console = ForeignConsole(foreign)
-    yield console
-    foreign.probe.destroy_publisher(console.publisher)
-    foreign.probe.destroy_publisher(console.clutch_publisher)
+    master = ForeignMaster(foreign)
+    yield master
+    foreign.probe.destroy_publisher(master.publisher)
+    foreign.probe.destroy_publisher(master.clutch_publisher)
     foreign.command('disable')
     foreign.advance(0.1)

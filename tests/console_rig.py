@@ -87,7 +87,7 @@ class ConsoleRig:
     client
         That node's side of the graph.
     goals, wanted
-        Angles of the motors' commands and of the console's, as they came.
+        Angles of the motors' commands and of the master's, as they came.
     clutches
         What was said of the clutch.
     """

@@ -2,5 +2,5 @@
 
 
 def code_of(name: str) -> str:
-    """What its console script runs, wherever that is installed."""
+    """What its executable runs, wherever that is installed."""
     return f'import sys; from endoscope_nodes.program import {name}; sys.exit({name}())'

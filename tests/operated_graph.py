@@ -279,8 +279,8 @@ class Typist:
 
     def stands(self) -> bool:
         """Let half a second go on; whether the goals of the motors stood still in it."""
-        begin = self.graph.conductor.now_ns
-        self.until(lambda: self.graph.conductor.now_ns > begin + 500_000_000)
+        begin = self.graph.clock.now_ns
+        self.until(lambda: self.graph.clock.now_ns > begin + 500_000_000)
         goals = [goal.position for goal in self.goals if goal.stamp_ns > begin]
         return not goals or bool(np.ptp(goals, axis=0).max() < 1e-9)
 

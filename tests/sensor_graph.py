@@ -24,9 +24,9 @@ from endoscope_nodes.names import (
     WIRES_MEASURED,
 )
 from endoscope_nodes.nodes.compensator import CompensatorNode
-from endoscope_nodes.nodes.console import ConsoleNode
 from endoscope_nodes.nodes.em_tracker import EmTrackerNode
 from endoscope_nodes.nodes.load_cells import LoadCellsNode
+from endoscope_nodes.nodes.master import MasterNode
 from endoscope_nodes.nodes.motor_driver import MotorDriverNode
 from endoscope_nodes.nodes.recorder import RecorderNode
 from endoscope_nodes.nodes.supervisor import SupervisorNode
@@ -41,13 +41,13 @@ NODES = (
     EmTrackerNode,
     SupervisorNode,
     CompensatorNode,
-    ConsoleNode,
+    MasterNode,
     RecorderNode,
 )
 
 
 class SensorGraph(ProbedGraph):
-    """All that stands between a console and the sensors, and a test node beside it.
+    """All that stands between the master and the sensors, and a test node beside it.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ class SensorGraph(ProbedGraph):
         return supervisor._refused.reason
 
     def play(self) -> None:
-        """Let the console move both joints."""
+        """Let the master move both joints."""
         self.set('console', source='motion', motion='periodic')
 
     def call(self, node: str, service: str) -> Trigger.Response:

@@ -10,8 +10,14 @@ from std_srvs.srv import Trigger
 
 from endoscope_benchmarks.private_domain import private_domain
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
-from endoscope_nodes.names import CALIBRATION_RESULT, CALIBRATION_RUN, JOINTS
-from endoscope_nodes.nodes.conductor import ConductorNode
+from endoscope_nodes.names import (
+    CALIBRATION_RESULT,
+    CALIBRATION_RUN,
+    CLOCK_NODE,
+    JOINTS,
+    MASTER_NODE,
+)
+from endoscope_nodes.nodes.simulation_clock import SimulationClockNode
 from endoscope_nodes.runtime.qos import LOCK_STEP, RESULT
 from endoscope_nodes.runtime.runtime import Runtime
 from endoscope_nodes.runtime.streams import JointSample, JointSubscription
@@ -48,7 +54,7 @@ class SimulatedGraph(ProbedGraph):
         self.domain = private_domain()
         overrides = overrides or {}
         # A busy machine may keep the nodes from answering a tick for long.
-        conductor = {'timeout': PATIENCE_S} | overrides.get('conductor', {})
+        clock = {'timeout': PATIENCE_S} | overrides.get('conductor', {})
         runtime = Runtime(
             args=[
                 *('--ros-args', '--log-level', 'fatal'),
@@ -56,15 +62,15 @@ class SimulatedGraph(ProbedGraph):
             ],
             context=Context(),
             domain_id=self.domain,
-            overrides=overrides | {'conductor': conductor},
+            overrides=overrides | {'conductor': clock},
             rig=rig,
         )
-        for factory in (*SLAVE_NODES, *CONTROL_NODES, *extra, ConductorNode):
+        for factory in (*SLAVE_NODES, *CONTROL_NODES, *extra, SimulationClockNode):
             if node_name(factory) not in without:
                 runtime.add(factory)
         runtime.check_parameters()
         super().__init__(runtime, PATIENCE_S)
-        self.conductor = self.nodes['conductor']
+        self.clock = self.nodes['conductor']
         self.results = []
         self.probe.create_subscription(
             DiagnosticArray, CALIBRATION_RESULT, self.results.append, RESULT
@@ -96,7 +102,7 @@ class SimulatedGraph(ProbedGraph):
             # A second at a time, so that what is waited for does not grow with the motion.
             slice_us = min(left, 1_000_000)
             left -= slice_us
-            future = self.conductor.advance(slice_us * 1e-6)
+            future = self.clock.advance(slice_us * 1e-6)
             assert self.runtime.spin_until(future, PATIENCE_S), 'simulated time stands still'
             future.result()
         # The tick is over for the nodes that time waits for; the others may have mail left.
@@ -169,4 +175,5 @@ class SimulatedGraph(ProbedGraph):
 
 def node_name(factory: type) -> str:
     """Name of the node that a class makes, by its module."""
-    return factory.__module__.rpartition('.')[2]
+    module = factory.__module__.rpartition('.')[2]
+    return {'master': MASTER_NODE, 'simulation_clock': CLOCK_NODE}.get(module, module)

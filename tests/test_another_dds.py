@@ -89,8 +89,8 @@ def travel(samples) -> float:
 
 def while_(graph, seconds, samples):
     """Let time go on; the samples that came in it."""
-    begin, end = len(samples), graph.conductor.now_ns + round(seconds * 1e9)
-    graph.until(lambda: graph.conductor.now_ns >= end)
+    begin, end = len(samples), graph.clock.now_ns + round(seconds * 1e9)
+    graph.until(lambda: graph.clock.now_ns >= end)
     return samples[begin:]
 
 

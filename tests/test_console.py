@@ -128,7 +128,7 @@ def test_what_the_console_plays_is_ended_only_on_demand_and_does_not_begin_anew(
             rig.until(lambda: page.state.get('playing') is not None, 'the motion')
             refused = page.order('claim')
             assert not refused['ok']
-            assert 'the console plays' in refused['why']
+            assert 'the master plays' in refused['why']
             ready(rig, page)
             assert rig.setting('console.source') == 'master'
             page.order('release')

@@ -153,7 +153,7 @@ def test_reference_pages_can_be_read_without_the_site() -> None:
         if page in API:
             assert re.findall(r'^.*\|\s+\|$', content, flags=re.M) == [], 'without a docstring'
     assert all(f'## endoscope {name}\n' in text['commands'] for name in ENDOSCOPE)
-    assert all(f'## {name}\n' in text['nodes'] for name in program.NODES)
+    assert all(f'## {started.name}\n' in text['nodes'] for started in program.PROGRAMS.values())
     assert all(f'| `{topic.name}` |' in text['topics'] for topic in TOPICS)
     assert all(f'## {name}\n' in text['effects'] for name in CATALOGUE)
     for page, (package, modules) in API.items():

@@ -35,7 +35,7 @@ class Asker(GraphClient):
     """
 
     def __init__(self, graph, happens):
-        super().__init__(graph.probe, self._live, lambda: graph.conductor.now_ns * 1e-9)
+        super().__init__(graph.probe, self._live, lambda: graph.clock.now_ns * 1e-9)
         self._graph = graph
         self._happens = happens
         index = next(k for k, (s, _) in enumerate(self._heard) if s.topic == DIAGNOSTICS)
@@ -122,7 +122,7 @@ class Unheard(GraphClient):
     """A client whose orders are lost on the way, beside whose waiting something happens once."""
 
     def __init__(self, graph, happens):
-        super().__init__(graph.probe, self._live, lambda: graph.conductor.now_ns * 1e-9)
+        super().__init__(graph.probe, self._live, lambda: graph.clock.now_ns * 1e-9)
         self._graph = graph
         self._happens = happens
         self.given = []

@@ -14,7 +14,7 @@ SIGNAL = periodic_signal(2.5 * np.pi)
 
 @pytest.fixture
 def motion_file(tmp_path):
-    """`SIGNAL` for both joints, as the console plays it."""
+    """`SIGNAL` for both joints, as the master plays it."""
     time = np.arange(0.0, SIGNAL.duration, 1e-3)
     angle, _ = SIGNAL(time)
     write_command_file(tmp_path / 'motion.csv', time, np.stack([angle, angle], axis=1))

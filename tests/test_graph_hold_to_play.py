@@ -8,7 +8,7 @@ from simulated_graph import TICK_RATE
 
 from endoscope_core.signals.command_file import write_command_file
 from endoscope_nodes.names import MASTER_CLUTCH
-from endoscope_nodes.nodes.console import WAITING
+from endoscope_nodes.nodes.master import WAITING
 from endoscope_nodes.runtime.qos import EVENT
 
 REACH = 0.6

@@ -6,7 +6,7 @@ from simulated_graph import SimulatedGraph
 
 from endoscope_core.physics import PlantDescription, SensorModel, simulate
 from endoscope_nodes.names import MOTORS, WIRES
-from endoscope_nodes.nodes.conductor import BarrierTimeout
+from endoscope_nodes.nodes.simulation_clock import BarrierTimeout
 
 STREAMS = {
     'slave/servo_jp': ('bend_x', 'bend_y'),

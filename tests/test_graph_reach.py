@@ -50,7 +50,7 @@ def test_a_calibration_finds_the_reach_and_the_console_keeps_to_it(tmp_path):
         graph.set('console', source='motion')
         graph.advance(4.0)
         asked = np.max([c.position for c in commands], axis=0)
-        # The console brakes as the acceleration allows; the compensator cuts the way of braking.
+        # The master brakes as the acceleration allows; the compensator cuts the way of braking.
         np.testing.assert_allclose(asked, [high for _, high in found], atol=0.03)
         assert 'this tube can be bent: bend_x from ' in warnings(graph, 'console: commands')[-1]
 

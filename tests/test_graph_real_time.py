@@ -24,11 +24,11 @@ TICK_RATE = 200
 RIG = dataclasses.replace(load_rig(), timeouts=Timeouts(command=1.0, stream=10.0, handle=1.0))
 
 
-class ForeignConsole(Node):
-    """A console with ordinary messages, default QoS and its own timer; joints in another order."""
+class ForeignMaster(Node):
+    """A master with ordinary messages, default QoS and its own timer; joints in another order."""
 
     def __init__(self, context):
-        super().__init__('foreign_console', context=context)
+        super().__init__('foreign_master', context=context)
         qos = QoSProfile(depth=10)
         self.measured = []
         self.reach = np.zeros(2)
@@ -73,8 +73,8 @@ class ForeignConsole(Node):
         self.commands.publish(message)
 
 
-def test_a_foreign_console_moves_the_slave():
-    factories = [f for f in (*SLAVE_NODES, *CONTROL_NODES) if f.__name__ != 'ConsoleNode']
+def test_a_foreign_master_moves_the_slave():
+    factories = [f for f in (*SLAVE_NODES, *CONTROL_NODES) if f.__name__ != 'MasterNode']
     with Runtime(
         ['--ros-args', '--log-level', 'fatal', '-p', f'tick_rate:={TICK_RATE}'],
         Context(),
@@ -84,7 +84,7 @@ def test_a_foreign_console_moves_the_slave():
     ) as runtime:
         for factory in factories:
             runtime.add(factory)
-        console = ForeignConsole(runtime.context)
+        console = ForeignMaster(runtime.context)
         runtime.executor.add_node(console)
         try:
             moved = runtime.spin_until(console.done, PATIENCE_S)

@@ -43,7 +43,7 @@ def running(tmp_path_factory):
     try:
         with joined_graph('tester', 'endoscope', domain) as client:
             client.find(PATIENCE_S)
-            client.wait_for(lambda: LOCK_STEP in client.health, 'the conductor', PATIENCE_S)
+            client.wait_for(lambda: LOCK_STEP in client.health, 'the simulation clock', PATIENCE_S)
             yield process, client
     finally:
         process.send_signal(signal.SIGINT)

@@ -19,7 +19,7 @@ from endoscope_nodes.runtime.diagnostics import OK, WARN
 from endoscope_nodes.runtime.qos import COMMAND
 
 # pytest looks for the fixtures of a test in its own module.
-foreign, console = commanded_graph.foreign, commanded_graph.console
+foreign, master = commanded_graph.foreign, commanded_graph.master
 
 
 # ---- states
@@ -121,13 +121,13 @@ def test_state_commands_out_of_place_change_nothing():
         ({'session': 'session-1'}, 'not of this motion session'),
     ],
 )
-def test_a_bad_command_is_refused_counted_and_changes_nothing(foreign, console, changes, reason):
-    console.move(200)
+def test_a_bad_command_is_refused_counted_and_changes_nothing(foreign, master, changes, reason):
+    master.move(200)
     moved = Moved(foreign)
     before = foreign.nodes['compensator'].gate.refused[reason]
-    console.tick(**changes)
+    master.tick(**changes)
     assert moved.goals == []
-    console.move(100)
+    master.move(100)
     foreign.advance(0.05)
     assert foreign.state == 'ENABLED'
     assert foreign.nodes['compensator'].gate.refused[reason] == before + 1
@@ -135,22 +135,22 @@ def test_a_bad_command_is_refused_counted_and_changes_nothing(foreign, console, 
     assert moved.largest_step < TICK_S
 
 
-def test_the_order_of_the_joints_does_not_matter(foreign, console):
-    console.move(200)
+def test_the_order_of_the_joints_does_not_matter(foreign, master):
+    master.move(200)
     moved = Moved(foreign)
-    console.move(20)
-    x, y = console.angle
+    master.move(20)
+    x, y = master.angle
     # Onwards: at a reversal the feed-forward crosses the backlash.
-    console.tick([y + console.towards * TICK_S, x], name=['bend_y', 'bend_x'])
+    master.tick([y + master.towards * TICK_S, x], name=['bend_y', 'bend_x'])
     steps = np.subtract(moved.goals[-1].position, moved.goals[-2].position)
-    assert steps[1] * console.towards > steps[0] * console.towards
+    assert steps[1] * master.towards > steps[0] * master.towards
 
 
-def test_a_step_is_refused_and_ends_the_session(foreign, console):
-    console.move(200)
+def test_a_step_is_refused_and_ends_the_session(foreign, master):
+    master.move(200)
     moved = Moved(foreign)
     for _ in range(300):
-        console.tick([1.4 * console.towards] * 2)
+        master.tick([1.4 * master.towards] * 2)
     assert foreign.state == 'FAULT'
     assert foreign.nodes['compensator'].gate.refused['too fast']
     assert 'slave/servo_jp ended while the clutch was held (too far' in foreign.cause
@@ -158,73 +158,73 @@ def test_a_step_is_refused_and_ends_the_session(foreign, console):
     assert moved.of_shafts < 0.05
 
 
-def test_a_first_command_far_from_the_measured_pose_moves_nothing(foreign, console):
+def test_a_first_command_far_from_the_measured_pose_moves_nothing(foreign, master):
     moved = Moved(foreign)
-    console.way = 0.3
+    master.way = 0.3
     for _ in range(300):
-        console.tick()
+        master.tick()
     assert moved.goals == []
     assert moved.of_shafts < STILL
 
 
-def test_stamps_that_run_ahead_stretch_no_allowance(foreign, console):
+def test_stamps_that_run_ahead_stretch_no_allowance(foreign, master):
     """The allowance of speed is spent once, not by every message anew."""
     moved = Moved(foreign)
     speed = RIG.joints.speed
     for k in range(200):
-        console.way = console.towards * min(1.0, abs(console.way) + 0.02 * speed)
-        console.tick(ahead_ns=k * 20_000_000)
+        master.way = master.towards * min(1.0, abs(master.way) + 0.02 * speed)
+        master.tick(ahead_ns=k * 20_000_000)
     assert moved.largest_step < BOUND
     assert foreign.nodes['compensator'].gate.refused['too fast']
 
 
-def test_enabling_anew_clears_what_a_stamp_from_the_future_left(foreign, console):
-    console.tick(ahead_ns=10_000_000_000)
-    console.move(50)
+def test_enabling_anew_clears_what_a_stamp_from_the_future_left(foreign, master):
+    master.tick(ahead_ns=10_000_000_000)
+    master.move(50)
     assert foreign.state == 'ENABLED'
     foreign.command('disable')
     foreign.advance(0.2)
     foreign.enable()
     corrections = foreign.listen(CORRECTION)
-    console.start, console.way = foreign.nodes['compensator']._pose.bending(), 0.0
-    console.move(600)
+    master.start, master.way = foreign.nodes['compensator']._pose.bending(), 0.0
+    master.move(600)
     assert len(corrections) > 1.1 * TICK_RATE
     assert foreign.diagnostics['controller: feedback'][-1].message == 'in the loop'
 
 
-def test_a_velocity_that_belies_the_positions_moves_nothing(foreign, console):
-    console.move(100)
+def test_a_velocity_that_belies_the_positions_moves_nothing(foreign, master):
+    master.move(100)
     for _ in range(300):
-        console.tick(velocity=[0.0, 0.0])
+        master.tick(velocity=[0.0, 0.0])
     moved = Moved(foreign)
     for k in range(500):
-        console.tick(velocity=[0.5 if k % 50 == 0 else 0.0] * 2)
+        master.tick(velocity=[0.5 if k % 50 == 0 else 0.0] * 2)
     assert moved.largest_step < TICK_S
     assert moved.of_tip < 0.02
 
 
 @pytest.mark.parametrize('clutch', [0, None], ids=['released', 'never heard of'])
-def test_nothing_moves_unless_the_clutch_is_held(foreign, console, clutch):
+def test_nothing_moves_unless_the_clutch_is_held(foreign, master, clutch):
     foreign.advance(0.4)
-    console.clutch = clutch
+    master.clutch = clutch
     moved = Moved(foreign)
     before = foreign.nodes['compensator'].gate.refused['clutch not held']
-    console.move(100)
+    master.move(100)
     assert moved.goals == []
     assert foreign.nodes['compensator'].gate.refused['clutch not held'] == before + 100
 
 
-def test_a_clutch_that_falls_silent_is_released(foreign, console):
+def test_a_clutch_that_falls_silent_is_released(foreign, master):
     moved = Moved(foreign)
-    console.move(20)
-    console.clutch = None
-    console.move(600)
+    master.move(20)
+    master.clutch = None
+    master.move(600)
     assert 0.34 * TICK_RATE <= len(moved.goals) <= 0.38 * TICK_RATE
     assert foreign.state == 'ENABLED'
 
 
-def test_commands_that_end_with_the_clutch_held_end_the_session(foreign, console):
-    console.move(300)
+def test_commands_that_end_with_the_clutch_held_end_the_session(foreign, master):
+    master.move(300)
     moved = Moved(foreign)
     foreign.advance(0.3)
     assert foreign.state == 'FAULT'
@@ -234,10 +234,10 @@ def test_commands_that_end_with_the_clutch_held_end_the_session(foreign, console
     assert moved.of_shafts < STILL
 
 
-def test_nothing_moves_unless_enabled(foreign, console):
+def test_nothing_moves_unless_enabled(foreign, master):
     assert foreign.command('disable') == 'DISABLED'
     moved = Moved(foreign)
-    console.move(100)
+    master.move(100)
     assert moved.goals == []
     assert moved.of_shafts < STILL
 
@@ -261,9 +261,9 @@ def test_after_a_rest_of_two_minutes_all_that_moves_the_slave_is_obeyed():
         assert graph.session == session
 
 
-def test_home_is_said_to_be_reached_where_it_is(foreign, console):
-    console.move(600)
-    console.hold(0)
+def test_home_is_said_to_be_reached_where_it_is(foreign, master):
+    master.move(600)
+    master.hold(0)
     foreign.advance(0.2)
     foreign.nodes['motor_driver']._device.set_torque(False)
     shafts = foreign.listen(MOTOR_MEASURED, MOTORS)
@@ -277,31 +277,31 @@ def test_home_is_said_to_be_reached_where_it_is(foreign, console):
     assert 'home reached' not in foreign.reported('calibration: procedure')['last']
 
 
-def test_motors_that_stand_still_under_commands_are_a_fault(foreign, console):
+def test_motors_that_stand_still_under_commands_are_a_fault(foreign, master):
     foreign.nodes['motor_driver']._device.set_torque(False)
     for _ in range(30):
-        console.move(10)
+        master.move(10)
         if foreign.state == 'FAULT':
             break
     # 13 counts are told within 0.1 s, which is looked at each 0.04 s; 0.3 s are waited for.
-    assert 0.3 <= console.sent / TICK_RATE <= 0.6
+    assert 0.3 <= master.sent / TICK_RATE <= 0.6
     assert 'motor_x stands still: its goal has gone' in foreign.cause
 
 
-def test_commands_that_are_refused_while_the_clutch_is_held_are_a_fault_and_said(foreign, console):
+def test_commands_that_are_refused_while_the_clutch_is_held_are_a_fault_and_said(foreign, master):
     moved = Moved(foreign)
-    console.way = 0.3
-    while foreign.state == 'ENABLED' and console.sent < TICK_RATE:
-        console.tick()
-    assert 0.3 <= console.sent / TICK_RATE <= 0.4
+    master.way = 0.3
+    while foreign.state == 'ENABLED' and master.sent < TICK_RATE:
+        master.tick()
+    assert 0.3 <= master.sent / TICK_RATE <= 0.4
     assert 'slave/servo_jp: ' in foreign.cause
     assert 'commands are refused, last: too far from the measured position' in foreign.cause
     foreign.command('disable')
     foreign.advance(0.2)
     foreign.enable()
     assert moved.goals == []
-    console.way = 0.0
-    console.move(100)
+    master.way = 0.0
+    master.move(100)
     assert foreign.state == 'ENABLED'
     assert len(moved.goals) > 50
 
@@ -328,7 +328,7 @@ def test_engaging_re_references_without_a_jump():
 
 
 def test_a_clutch_held_through_an_interrupted_calibration_moves_nothing():
-    """The console engages at the measured pose, not at its own last command."""
+    """The master engages at the measured pose, not at its own last command."""
     with run(overrides={'console': {'source': 'master'}}) as graph:
         handle = Handle(graph)
         handle.move(0.6, (0.7, 0.7))
@@ -395,9 +395,9 @@ def test_unusable_handle_messages_are_counted_and_said():
 @pytest.mark.parametrize('source', ['none', 'motion'])
 def test_a_handle_that_nothing_follows_is_said_with_what_to_do(source):
     with run(overrides={'console': {'source': source}}) as graph:
-        console, said = graph.nodes['console'], []
+        master, said = graph.nodes['console'], []
         # While a motion is played the handle's clutch is a second one: an error of its own.
-        console.get_logger = lambda: SimpleNamespace(warning=said.append, error=lambda _: None)
+        master.get_logger = lambda: SimpleNamespace(warning=said.append, error=lambda _: None)
         handle = Handle(graph)
         handle.move(1.1, clutch=False)
         assert not said
@@ -406,7 +406,7 @@ def test_a_handle_that_nothing_follows_is_said_with_what_to_do(source):
         told = graph.diagnostics['console: commands'][-1]
         assert told.level == WARN
         assert told.message == (
-            f"the handle moves and nothing follows it: the console's source is {source}; {advice}"
+            f"the handle moves and nothing follows it: the master's source is {source}; {advice}"
         )
         assert said == [told.message]
         graph.set('console', source='master')

@@ -16,6 +16,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from endoscope_benchmarks.private_domain import private_domain
+from endoscope_nodes.program import PROGRAMS
 from endoscope_nodes.runtime.qos import EVENT, SENSOR_ASKED
 
 DOMAIN = private_domain()
@@ -105,9 +106,8 @@ def rig(tmp_path):
 
 
 def test_each_node_is_a_process_and_stops_cleanly(operator, rig):
-    processes = {
-        node: start(node, *rig, *(['-p', 'source:=motion'] * (node == 'console'))) for node in NODES
-    }
+    plays = {'console': ['-p', 'source:=motion']}
+    processes = {node: start(PROGRAMS[node].name, *rig, *plays.get(node, [])) for node in NODES}
     try:
         operator.wait_until(lambda: operator.heard >= set(NODES))
         operator.wait_until(
@@ -142,7 +142,7 @@ def test_the_whole_graph_in_motion_stops_cleanly(operator, rig, tmp_path, number
     ('node', 'override', 'words'),
     [
         (
-            'console',
+            'master',
             'sorce:=motion',
             "console: unknown parameter 'sorce'; did you mean 'source'?",
         ),

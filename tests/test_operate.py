@@ -219,7 +219,7 @@ def test_a_recording_is_begun_and_ended(graph, tmp_path):
     assert (bag / 'metadata.yaml').is_file()
 
 
-def test_status_names_every_node_and_the_source_of_the_console(graph):
+def test_status_names_every_node_and_the_source_of_the_master(graph):
     status, out, _ = graph.run('operate', 'status')
     assert status == 0
     lines = {line.split()[0]: line for line in out.splitlines()}

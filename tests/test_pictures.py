@@ -41,7 +41,7 @@ def test_the_graph_shows_who_speaks_to_whom() -> None:
         for topic in re.findall(r'\w+/\w+', label.replace('\\n', ' '))
         if speaker in NODES and listener in NODES
     }
-    # The session goes to every node that moves: the picture has one arrow and says so. A console
+    # The session goes to every node that moves: the picture has one arrow and says so. A master
     # that plays a motion holds the clutch in place of the handle, which the picture shows.
     session = names.MOTION_SESSION
     spoken = {

@@ -163,7 +163,7 @@ def test_a_program_started_by_nohup_outlives_the_terminal(tmp_path):
     [
         ('graph', ['-h']),
         ('graph', ['--ros-args', '--help']),
-        ('console', ['--ros-args', '-p', 'source:=motion', '-h']),
+        ('master', ['--ros-args', '-p', 'source:=motion', '-h']),
         ('graph', ['--ros-args', '-r', '__ns:=/left', '--', '--help']),
     ],
 )
@@ -173,21 +173,31 @@ def test_who_asks_for_help_gets_it_and_starts_nothing(name, args):
     assert out.startswith(f'usage: {name} ')
 
 
-@pytest.mark.parametrize('name', ['graph', *NODES])
-def test_help_tells_every_parameter(name):
+@pytest.mark.parametrize('node', ['graph', *NODES])
+def test_help_tells_every_parameter(node):
+    name = 'graph' if node == 'graph' else program.PROGRAMS[node].name
     code, out, errors = ended(name, '--help')
     assert (code, errors) == (0, '')
     assert out.startswith(f'usage: {name} ')
     told = ' '.join(out.split())
-    for node in NODES if name == 'graph' else [name]:
-        if (name, node) == ('graph', 'replay'):
-            continue
-        for kind in (*OF_NODE[node], *OF_PROCESS):
+    for one in set(NODES) - {'replay'} if node == 'graph' else [node]:
+        for kind in (*OF_NODE[one], *OF_PROCESS):
             for parameter in described(kind):
                 mark = '* ' if parameter.dynamic else ''
                 assert f'{mark}-p {parameter.name}:={parameter.default} ' in told
                 assert parameter.description in told
                 assert f'{parameter.allowed} {parameter.unit}'.strip() in told
+
+
+@pytest.mark.parametrize(
+    ('old', 'name'), [('console', 'master'), ('conductor', 'simulation_clock')]
+)
+def test_an_old_name_starts_the_program_and_says_what_it_is_called(old, name):
+    code, out, errors = ended(old, '--help')
+    assert code == 0
+    assert out.startswith(f'usage: {name} ')
+    [line] = errors.splitlines()
+    assert line.startswith(f'{old}: this program is called {name}; ')
 
 
 def test_help_loads_neither_ros_nor_anything_that_computes():
@@ -223,10 +233,9 @@ def test_words_that_nobody_would_hear_are_one_line_and_exit_code_2(tmp_path, arg
     assert not (tmp_path / 'bags').exists()
 
 
-@pytest.mark.parametrize('name', ['graph', *NODES])
-def test_every_program_leads_to_a_module_that_runs(name):
-    named = getattr(program, name)
-    assert named.name == name
+@pytest.mark.parametrize('named', [program.graph, *program.PROGRAMS.values()], ids=lambda p: p.name)
+def test_every_program_leads_to_a_module_that_runs(named):
+    assert getattr(program, named.name) == named
     module, _, what = named.runs.partition(':')
     assert callable(getattr(importlib.import_module(f'endoscope_nodes.{module}'), what))
 

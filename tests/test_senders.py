@@ -35,7 +35,7 @@ from endoscope_nodes.runtime.qos import COMMAND, EVENT, RESULT, SENSOR_OFFERED
 
 LOW_REACH = {'low': -0.5, 'high': 0.5}
 # pytest looks for the fixtures of a test in its own module.
-foreign, console = commanded_graph.foreign, commanded_graph.console
+foreign, master = commanded_graph.foreign, commanded_graph.master
 
 
 def until(condition):
@@ -106,9 +106,9 @@ def test_two_senders_of_a_motion_topic_are_a_fault_that_names_both():
         (SLAVE_COMMAND, JOINTS, 'controller'),
     ],
 )
-def test_a_command_that_outlives_its_sender_is_not_obeyed(foreign, console, topic, names, reader):
+def test_a_command_that_outlives_its_sender_is_not_obeyed(foreign, master, topic, names, reader):
     """It waits for a node that is not run, and only the session's own sender is left by then."""
-    console.move(100)
+    master.move(100)
     node = foreign.nodes[reader]
     gates = {
         'motor_driver': lambda: node.motion.gate,
@@ -118,11 +118,11 @@ def test_a_command_that_outlives_its_sender_is_not_obeyed(foreign, console, topi
     gate = gates[reader]()
     # The motor driver judges what came in its next turn.
     foreign.advance(0.002)
-    pose = node.motion.goal if reader == 'motor_driver' else console.angle
+    pose = node.motion.goal if reader == 'motor_driver' else master.angle
     obeyed, refused = gate.accepted, gate.refused[Refusal.SENDER]
     message = JointState(name=list(names), position=[x + 1e-3 for x in pose])
     message.header.frame_id = foreign.session
-    message.header.stamp = Time(nanoseconds=foreign.conductor.now_ns + 1_000_000).to_msg()
+    message.header.stamp = Time(nanoseconds=foreign.clock.now_ns + 1_000_000).to_msg()
     leave_behind(foreign, node, topic, message, COMMAND)
     for _ in range(200):
         if gate.accepted > obeyed or gate.refused[Refusal.SENDER] > refused:
@@ -135,9 +135,9 @@ def test_a_command_that_outlives_its_sender_is_not_obeyed(foreign, console, topi
     assert topic in foreign.cause
 
 
-def test_a_heartbeat_that_outlives_its_sender_opens_nothing(foreign, console):
+def test_a_heartbeat_that_outlives_its_sender_opens_nothing(foreign, master):
     """A rival of the supervisor has come and gone while the motor driver was not run."""
-    console.move(100)
+    master.move(100)
     node = foreign.nodes['motor_driver']
     leave_behind(foreign, node, MOTION_SESSION, Header(frame_id='session-99'), EVENT)
     entered = set()
@@ -149,9 +149,9 @@ def test_a_heartbeat_that_outlives_its_sender_opens_nothing(foreign, console):
     assert MOTION_SESSION in foreign.cause
 
 
-def test_a_clutch_that_outlives_its_sender_is_not_held_before_it_is_let_go_of(foreign, console):
-    console.move(20)
-    console.hold(0)
+def test_a_clutch_that_outlives_its_sender_is_not_held_before_it_is_let_go_of(foreign, master):
+    master.move(20)
+    master.hold(0)
     clutches = [foreign.nodes[name]._clutch for name in ('compensator', 'console')]
     foreign.advance(0.1)
     leave_behind(foreign, foreign.nodes['compensator'], MASTER_CLUTCH, Joy(buttons=[1]), EVENT)
@@ -163,10 +163,10 @@ def test_a_clutch_that_outlives_its_sender_is_not_held_before_it_is_let_go_of(fo
     assert foreign.state == 'FAULT'
     assert MASTER_CLUTCH in foreign.cause
     foreign.enable()
-    console.hold(1)
+    master.hold(1)
     assert not any(clutch.held for clutch in clutches)
-    console.hold(0)
-    console.hold(1)
+    master.hold(0)
+    master.hold(1)
     assert all(clutch.held for clutch in clutches)
 
 
@@ -175,15 +175,15 @@ def test_a_handle_that_outlives_its_sender_is_not_followed(foreign):
     foreign.enable()
     handle = Handle(foreign)
     handle.move(0.2, clutch=False)
-    console = foreign.nodes['console']
+    master = foreign.nodes['console']
     taken = []
-    take = console._handle.take
-    console._handle.take = lambda *sample: (taken.append(sample[1]), take(*sample))[1]
+    take = master._handle.take
+    master._handle.take = lambda *sample: (taken.append(sample[1]), take(*sample))[1]
     message = JointState(name=list(JOINTS), position=[0.9, 0.9])
-    message.header.stamp = Time(nanoseconds=foreign.conductor.now_ns + 1_000_000).to_msg()
-    leave_behind(foreign, console, MASTER_MEASURED, message, SENSOR_OFFERED)
+    message.header.stamp = Time(nanoseconds=foreign.clock.now_ns + 1_000_000).to_msg()
+    leave_behind(foreign, master, MASTER_MEASURED, message, SENSOR_OFFERED)
     handle.move(0.1, clutch=False)
-    del console._handle.take
+    del master._handle.take
     foreign.probe.destroy_publisher(handle.publisher)
     foreign.probe.destroy_publisher(handle.clutch_publisher)
     assert taken
@@ -198,7 +198,7 @@ def test_a_result_that_outlives_its_sender_is_not_taken(reader):
     with run() as graph:
         assert graph.call_calibration().success
         graph.advance(0.5)
-        compensator, console = graph.nodes['compensator'], graph.nodes['console']
+        compensator, master = graph.nodes['compensator'], graph.nodes['console']
         assert compensator._calibrated_in == graph.session
         reaches = {f'reach.{joint}.{end}': x for joint in JOINTS for end, x in LOW_REACH.items()}
         result = DiagnosticArray()
@@ -208,7 +208,7 @@ def test_a_result_that_outlives_its_sender_is_not_taken(reader):
         ]
         leave_behind(graph, graph.nodes[reader], CALIBRATION_RESULT, result, RESULT)
         graph.advance(0.5)
-        taken = {'compensator': compensator._found, 'console': console._reaches}
+        taken = {'compensator': compensator._found, 'console': master._reaches}
         assert not taken[reader]
         assert graph.state == 'FAULT'
         assert CALIBRATION_RESULT in graph.cause

@@ -219,8 +219,8 @@ def test_home_goes_on_while_its_key_is_held_and_is_paused_otherwise(graph):
 def test_it_says_why_nothing_moves(graph):
     with Typist(graph, '--take') as typist:
         typist.shows('E enables')
-        began = graph.conductor.now_ns
-        typist.hold(W, until=lambda: graph.conductor.now_ns > began + 1_000_000_000)
+        began = graph.clock.now_ns
+        typist.hold(W, until=lambda: graph.clock.now_ns > began + 1_000_000_000)
         assert 1 not in graph.clutches
         assert not typist.wanted
         typist.type(b'e')
@@ -248,7 +248,7 @@ def test_a_motion_that_the_console_played_does_not_begin_anew_with_nobody_lookin
         assert typist.stands()
 
 
-def test_it_asks_before_it_takes_the_console(graph):
+def test_it_asks_before_it_takes_the_handle(graph):
     with Typist(graph) as typist:
         typist.until(lambda: 'Set it to master until teleop ends? [y/N]' in typist.text)
         typist.type(b'n\n')

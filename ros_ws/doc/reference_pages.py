@@ -118,8 +118,10 @@ def _spelling(action: argparse.Action) -> str:
 
 def _nodes() -> Iterator[str]:
     """What each node hears, says and serves, from the table of topics."""
-    for name in program.NODES:
-        yield from ('', f'## {name}', '', getattr(program, name).purpose)
+    for name, started in program.PROGRAMS.items():
+        yield from ('', f'## {started.name}', '', started.purpose)
+        if name != started.name:
+            yield from ('', f'Node name `{name}`.')
         heard = [topic.name for topic in TOPICS if name in topic.heard_by]
         said = [topic.name for topic in TOPICS if name in topic.said_by]
         served = [service.name for service in SERVICES if service.served_by == name]

@@ -52,7 +52,7 @@ def test_gaps_are_silences_with_missing_numbers(tmp_path):
 
 
 def test_a_publisher_that_rests_has_pauses_and_lost_nothing(tmp_path):
-    """Such as a console whose clutch is released: its numbers go on where they stopped."""
+    """Such as a master whose clutch is released: its numbers go on where they stopped."""
     with BagWriter(tmp_path / 'bag') as writer:
         moments = [k for k in range(1000) if not (100 <= k < 220 or 500 <= k < 555)]
         for number, k in enumerate(moments, start=1):

@@ -21,9 +21,9 @@ from launch_ros.actions import Node, SetParameter
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
-NODES = (
+PROGRAMS = (
     *('motor_driver', 'load_cells', 'em_tracker'),
-    *('supervisor', 'compensator', 'controller', 'calibration', 'console'),
+    *('supervisor', 'compensator', 'controller', 'calibration', 'master'),
     *('instrument_model', 'recorder'),
 )
 
@@ -87,8 +87,10 @@ def generate_launch_description() -> LaunchDescription:
             SetParameter('use_sim_time', False, condition=IfCondition(real_time)),
             SetParameter('use_sim_time', True, condition=in_lock_step),
             GroupAction([node('graph')], condition=IfCondition(NotSubstitution(many))),
-            GroupAction([node(name) for name in NODES], condition=IfCondition(many)),
-            # The conductor says the simulated time, no faster than the wall clock.
-            GroupAction([SetParameter('speed', 1.0), node('conductor')], condition=in_lock_step),
+            GroupAction([node(name) for name in PROGRAMS], condition=IfCondition(many)),
+            # The simulation clock gives the time, no faster than the wall clock.
+            GroupAction(
+                [SetParameter('speed', 1.0), node('simulation_clock')], condition=in_lock_step
+            ),
         ]
     )

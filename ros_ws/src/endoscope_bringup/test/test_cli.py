@@ -170,7 +170,7 @@ def test_help_imports_nothing_heavy() -> None:
     [
         'from endoscope_bringup.cli import main; main(["--help"])',
         'from endoscope_bringup.cli import main; main(["effects"])',
-        'from endoscope_nodes.program import conductor; conductor(["--help"])',
+        'from endoscope_nodes.program import simulation_clock; simulation_clock(["--help"])',
         'from endoscope_nodes.healthcheck import main; main(["--help"])',
     ],
 )

@@ -1,4 +1,4 @@
-"""`endoscope invert` on what the console plays: a file, and the desired angles of a bag."""
+"""`endoscope invert` on what the master plays: a file, and the desired angles of a bag."""
 
 import numpy as np
 import pytest

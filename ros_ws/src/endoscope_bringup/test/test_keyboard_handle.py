@@ -22,7 +22,7 @@ SPEED = 0.3
 
 @dataclass
 class Hand:
-    """Keys typed at a keyboard handle whose console follows at once."""
+    """Keys typed at a keyboard handle whose master follows at once."""
 
     handle: KeyboardHandle
     ms: int = 0
@@ -161,7 +161,7 @@ def test_a_hindrance_that_ends_while_the_key_is_held_moves_nothing():
             hand.rest(20)
 
 
-def test_the_hand_waits_until_the_console_follows():
+def test_the_hand_waits_until_the_master_follows():
     hand = told()
     hand.follows = False
     hand.turn('w')

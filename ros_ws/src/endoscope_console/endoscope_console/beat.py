@@ -29,7 +29,7 @@ class Situation(Conditions):
     """What the graph and the lease are like, as the other threads last said."""
 
     speaks: bool = False  # the handle's place is free and its own: only then it is a sender
-    wanted: tuple[float, ...] | None = None  # (J,), asked of the slave by the console, in rad
+    wanted: tuple[float, ...] | None = None  # (J,), asked of the slave by the master, in rad
     wanted_ns: int = 0  # when they were heard
     scale: float = 1.0  # slave motion for one radian of the handle
 

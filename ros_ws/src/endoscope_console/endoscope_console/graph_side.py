@@ -22,7 +22,7 @@ from endoscope_core.errors import EndoscopeError
 from endoscope_core.rig import load_rig
 from endoscope_nodes.client.calibration_result import REACH
 from endoscope_nodes.client.graph_client import GraphClient
-from endoscope_nodes.client.graph_listener import CONSOLE, GraphError, Health
+from endoscope_nodes.client.graph_listener import MASTER, GraphError, Health
 from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
 from endoscope_nodes.client.handle_sender import handle_senders
 from endoscope_nodes.names import CONSOLE_LOG, FINISHED
@@ -65,7 +65,7 @@ def identified(calibration: Health | None) -> bool:
 
 @dataclass(frozen=True)
 class Settings:
-    """What the console node was last known to be set to."""
+    """What the master was last known to be set to."""
 
     source: str = ''  # where its commands come from; empty before it was asked
     scale: float = 1.0  # slave motion for one radian of the handle
@@ -78,7 +78,7 @@ class GraphSide:
         self._services = services
         self.client = client
         self.pictures = pictures
-        # Of the console node; asked for each second, and by whoever changed them.
+        # Of the master; asked for each second, and by whoever changed them.
         self.settings = Settings()
         self.heard_ns = 0  # operating state, by a steady clock
         # Status with which the graph of this program has ended; None while it runs, or is
@@ -102,7 +102,7 @@ class GraphSide:
             self.ask_for_settings(now_ns)
 
     def ask_for_settings(self, now_ns: int) -> None:
-        """Ask the console node what it is set to, at a time in ns; the answer comes later."""
+        """Ask the master what it is set to, at a time in ns; the answer comes later."""
         self._asked_ns = now_ns
         asking = self.client.client(GetParameters, 'console/get_parameters')
         if asking.service_is_ready():
@@ -119,8 +119,8 @@ class GraphSide:
 
     @property
     def plays(self) -> bool:
-        """Whether the console node moves the slave by itself."""
-        said = self.client.health.get(CONSOLE)
+        """Whether the master moves the slave by itself."""
+        said = self.client.health.get(MASTER)
         return self.settings.source in PLAYS and (said is None or said.values[FINISHED] != 'True')
 
     def others_at_the_handle(self) -> list[str]:

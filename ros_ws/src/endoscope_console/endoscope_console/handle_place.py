@@ -1,4 +1,4 @@
-"""The handle's place in the graph, which has room for one, and the console that follows it."""
+"""The handle's place in the graph, which has room for one, and the master that follows it."""
 
 import asyncio
 import time
@@ -12,6 +12,7 @@ from endoscope_core.choices import FOLLOW_THE_HANDLE, PLAYS
 from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.client.graph_listener import GraphError
 from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
+from endoscope_nodes.names import MASTER_NODE
 
 _PLACE_S = 5.0
 _LOOK_S = 0.05
@@ -32,21 +33,21 @@ class HandlePlace:
     """Lives in the thread of the sockets; `ask` waits for the graph in another."""
 
     def __init__(self, graph: GraphSide, beat: Beat, ask: Ask) -> None:
-        self.lock = asyncio.Lock()  # of whoever changes what the console follows
+        self.lock = asyncio.Lock()  # of whoever changes what the master follows
         self.speaks = False  # the server is the one who speaks for the handle
         self._graph, self._beat, self._ask = graph, beat, ask
         self._found = FOLLOW_THE_HANDLE
 
     async def take(self, take: bool) -> None:
-        """Become the one who speaks for the handle, and have the console follow it."""
+        """Become the one who speaks for the handle, and have the master follow it."""
         graph = self._graph
         settings = graph.settings = await self._ask(self._read_settings)
         if graph.plays and not take:
             raise EndoscopeError(
-                f'the console plays (its source is {settings.source}): taking the controls would '
+                f'the master plays (its source is {settings.source}): taking the controls would '
                 'end that'
             )
-        own = ('console',) if settings.source in PLAYS else ()
+        own = (MASTER_NODE,) if settings.source in PLAYS else ()
         others = [name for name in graph.others_at_the_handle() if name not in own]
         if others:
             raise EndoscopeError(
@@ -54,7 +55,7 @@ class HandlePlace:
                 'fault: end it first'
             )
         if settings.source != FOLLOW_THE_HANDLE:
-            await self._ask(partial(self.set_console, source=FOLLOW_THE_HANDLE))
+            await self._ask(partial(self.set_master, source=FOLLOW_THE_HANDLE))
             end = time.monotonic() + _PLACE_S
             while graph.others_at_the_handle() and time.monotonic() < end:
                 await asyncio.sleep(_LOOK_S)
@@ -69,19 +70,19 @@ class HandlePlace:
         self.speaks = True
 
     def _read_settings(self) -> Settings:
-        return Settings(**self.read_console('source', 'scale'))
+        return Settings(**self.read_master('source', 'scale'))
 
-    def read_console(self, *names: str) -> dict[str, Any]:
-        """Values of the console node's parameters."""
+    def read_master(self, *names: str) -> dict[str, Any]:
+        """Values of the master's parameters."""
         client = self._graph.client
-        return {name: read_parameter(client, f'console.{name}', PATIENCE_S).value for name in names}
+        return {n: read_parameter(client, f'{MASTER_NODE}.{n}', PATIENCE_S).value for n in names}
 
-    def set_console(self, **values: Any) -> None:
-        """Set parameters of the console node."""
-        set_parameters(self._graph.client, 'console', values, PATIENCE_S)
+    def set_master(self, **values: Any) -> None:
+        """Set parameters of the master."""
+        set_parameters(self._graph.client, MASTER_NODE, values, PATIENCE_S)
 
     async def give_back(self) -> None:
-        """Leave the handle to others, and the console as it was found."""
+        """Leave the handle to others, and the master as it was found."""
         end = time.monotonic() + _SILENCED_S
         while self._beat.said.speaks and time.monotonic() < end:
             await asyncio.sleep(_LOOK_S)
@@ -94,8 +95,8 @@ class HandlePlace:
         self._graph.ask_for_settings(time.monotonic_ns())
 
     async def _set_source_back(self, source: str) -> None:
-        """Have the console follow what it did before, which begins no motion by itself."""
+        """Have the master follow what it did before, which begins no motion by itself."""
         if source in PLAYS and self._graph.client.state == 'ENABLED':
             await self._ask(partial(self._graph.client.ask, 'pause', PATIENCE_S))
         if source != FOLLOW_THE_HANDLE:
-            await self._ask(partial(self.set_console, source=source))
+            await self._ask(partial(self.set_master, source=source))

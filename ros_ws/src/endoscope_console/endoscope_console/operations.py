@@ -25,12 +25,12 @@ from endoscope_core.choices import (
     PHYSICAL,
 )
 from endoscope_core.errors import EndoscopeError
-from endoscope_nodes.client.graph_listener import CONSOLE, GraphError
+from endoscope_nodes.client.graph_listener import MASTER, GraphError
 from endoscope_nodes.names import FINISHED, RECORDER_START, RECORDER_STOP
 from endoscope_nodes.runtime.node_parameters import CompensatorParameters
 
 _WAITING_ORDERS = 16
-# The console tells once a second how far it is; a word from before it was asked means nothing.
+# The master tells once a second how far it is; a word from before it was asked means nothing.
 _NEXT_WORD_NS = 1_500_000_000
 _EXPERIMENT = 'an experiment'
 _NO_LEASE = (
@@ -54,10 +54,10 @@ class _Holder:
 
 @dataclass
 class _Played:
-    """An experiment that the console plays while the operator holds on."""
+    """An experiment that the master plays while the operator holds on."""
 
     begun_ns: int
-    before: Mapping[str, Any]  # what the console was set to for a file of its own
+    before: Mapping[str, Any]  # what the master was set to for a file of its own
     ends: bool = False
 
 
@@ -123,8 +123,8 @@ class Operations:
         self._tell_beat()
 
     def _is_over(self, played: _Played) -> bool:
-        """Whether the console has said, since it was asked to play, that it is at the end."""
-        said = self.graph.client.health.get(CONSOLE)
+        """Whether the master has said, since it was asked to play, that it is at the end."""
+        said = self.graph.client.health.get(MASTER)
         heard = said is not None and said.values[FINISHED] == 'True'
         return heard and time.monotonic_ns() - played.begun_ns > _NEXT_WORD_NS
 
@@ -335,7 +335,7 @@ class Operations:
         return found.message
 
     async def _play(self, client: Client, explanation: str) -> str:
-        """Have the console play an experiment for as long as the operator holds on."""
+        """Have the master play an experiment for as long as the operator holds on."""
         file = self.explanations.experiment_of(explanation)
         if self._holder.moves:
             raise EndoscopeError(f'{self._holder.moves} is under way')
@@ -344,7 +344,7 @@ class Operations:
         values = {'command_file': str(file), 'hold_to_play': True, 'source': 'file'}
         async with self._place.lock:
             changed = 'command_file', 'hold_to_play'
-            before = await self._ask(partial(self._place.read_console, *changed))
+            before = await self._ask(partial(self._place.read_master, *changed))
             if self.lease.holder != client.id or self._holder.moves:
                 raise EndoscopeError('the controls were lost or taken to something else')
             # Said before it is so: whoever loses the controls meanwhile leaves nothing behind.
@@ -352,7 +352,7 @@ class Operations:
             holder.moves, holder.waits = _EXPERIMENT, True
             played = self._played = _Played(time.monotonic_ns(), before)
             try:
-                await self._ask(partial(self._place.set_console, **values))
+                await self._ask(partial(self._place.set_master, **values))
             except BaseException:
                 # It may have been set all the same, and only not answered.
                 self.soon(self._end_of_play())
@@ -362,7 +362,7 @@ class Operations:
         return 'it plays while the dead-man is held; give the controls back to leave it'
 
     async def _end_of_play(self) -> None:
-        """Have the console follow the handle again."""
+        """Have the master follow the handle again."""
         async with self._place.lock:
             if self._played is None:
                 return
@@ -371,7 +371,7 @@ class Operations:
                 self._holder.moves = ''
             try:
                 before = before | {'source': FOLLOW_THE_HANDLE}
-                await self._ask(partial(self._place.set_console, **before))
+                await self._ask(partial(self._place.set_master, **before))
             except GraphError as error:
                 self.graph.log(f'console.source {FOLLOW_THE_HANDLE}', '', '', False, str(error))
             self.graph.ask_for_settings(time.monotonic_ns())
@@ -380,7 +380,7 @@ class Operations:
         if order.scale is not None:
             if self.beat.said.state is DeadManState.ENGAGED:
                 raise EndoscopeError('the scale changes only while nothing is held')
-            await self._ask(partial(self._place.set_console, scale=order.scale))
+            await self._ask(partial(self._place.set_master, scale=order.scale))
             self.graph.settings = Settings(self.graph.settings.source, order.scale)
         elif order.compensator is not None:
             await self._ask(partial(self.graph.compensate, order.compensator))

@@ -31,7 +31,7 @@ class _Order(msgspec.Struct, frozen=True, tag_field='op', forbid_unknown_fields=
 
 
 class Claim(_Order, tag='claim', frozen=True):
-    """Become the operator; `take` from whoever is, and end what the console plays."""
+    """Become the operator; `take` from whoever is, and end what the master plays."""
 
     take: bool = False
 

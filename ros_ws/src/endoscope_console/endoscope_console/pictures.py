@@ -120,7 +120,7 @@ class Pictures:
         # (N, 2), the last pictures by number and steady time in ns.
         self.made: tuple[tuple[int, int], ...] = ()
         self.tensions: tuple[float, ...] = ()  # (4,), newest in N; empty before the first
-        # (J,), asked of the slave by the console, in rad.
+        # (J,), asked of the slave by the master, in rad.
         self.wanted: tuple[float, ...] | None = None
         self.wanted_ns = 0  # when they were found here, by a steady clock
         # The compensator puts out commands for the motors: what is wanted is obeyed.

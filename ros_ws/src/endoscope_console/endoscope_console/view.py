@@ -13,7 +13,7 @@ from endoscope_console.operations import Operations
 from endoscope_console.teleop.operator import STATE_NS, DeadManState, Reason
 from endoscope_core.rig import Rig
 from endoscope_nodes.client.graph_client import GraphClient
-from endoscope_nodes.client.graph_listener import COMMANDS, CONSOLE, LOCK_STEP, RECORDER, Health
+from endoscope_nodes.client.graph_listener import COMMANDS, LOCK_STEP, MASTER, RECORDER, Health
 from endoscope_nodes.names import WIRES
 
 _LEVELS = ('ok', 'warning', 'error', 'stale')
@@ -133,7 +133,7 @@ class View:
     def _playing(self) -> dict[str, Any] | None:
         if not self._graph.plays:
             return None
-        said = self._client.health.get(CONSOLE)
+        said = self._client.health.get(MASTER)
         done, length = (
             None if said is None else _number(said, f'{key} [s]') for key in ('progress', 'length')
         )

@@ -47,7 +47,7 @@ ENDS = {
     'no supervisor': (Reason.STATE, of_conditions(state_age_ns=3501 * MS)),
     'another session': (Reason.STATE, of_conditions(session='session-2')),
     'calibration': (Reason.CALIBRATION, of_conditions(calibrating=True)),
-    'another source of the console': (Reason.SOURCE, of_conditions(source='none')),
+    'another source of the master': (Reason.SOURCE, of_conditions(source='none')),
     'a played motion': (Reason.SOURCE, of_conditions(source='file', playing=True)),
     'old pictures': (Reason.BLIND, goes_blind),
     'a beat that stood still': (Reason.STALLED, was_not_run),

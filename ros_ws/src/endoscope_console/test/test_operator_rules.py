@@ -60,7 +60,7 @@ class AnOperator(RuleBasedStateMachine):
         self.arrived = self.turned = self.page.now
         self.hands_off = False
         self.new_grip = 0
-        self.of_grip = self.of_console = ()
+        self.of_grip = self.of_master = ()
         self.of_session = ''
         self.ended = Counter()
 
@@ -169,12 +169,12 @@ class AnOperator(RuleBasedStateMachine):
             self.quickest.pop(said.holder, None)
             ends.add(Reason.LOST)
         forbidden = self.forbidden()
-        of_console = said.source, said.playing
+        of_master = said.source, said.playing
         after = self.dead_man.state
         if before is ENGAGED:
             ends |= forbidden | ({Reason.STALLED} if stalled else set())
             ends |= {Reason.SILENT} if silent else set()
-            ends |= {Reason.SOURCE} if of_console != self.of_console else set()
+            ends |= {Reason.SOURCE} if of_master != self.of_master else set()
             ends |= {Reason.STATE} if said.session != self.of_session else set()
             self.has_ended(ends)
         elif before is OPEN:
@@ -184,7 +184,7 @@ class AnOperator(RuleBasedStateMachine):
             assert after is ENGAGED
             frame = self.newest
             self.of_grip = frame.grip, frame.source, frame.position_mode
-            self.of_console, self.of_session = of_console, said.session
+            self.of_master, self.of_session = of_master, said.session
             EVER[ENGAGED] += 1
         else:
             assert after is (OPEN if forbidden or self.newest.pressed else READY)

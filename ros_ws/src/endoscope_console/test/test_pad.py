@@ -14,7 +14,7 @@ LIMITS = (3.0, 3.0)
 
 
 class Follower:
-    """A console that follows 60 ms late, from 0.3 rad and to 1 rad either way."""
+    """A master that follows 60 ms late, from 0.3 rad and to 1 rad either way."""
 
     def __init__(self, speeds=SPEEDS, scale=1.0):
         self.pad = PadHandle(2, speeds, LIMITS)

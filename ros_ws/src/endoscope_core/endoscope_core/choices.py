@@ -30,13 +30,13 @@ CALIBRATION_MOTIONS = (SINUSOID, BRIEF)
 """Motions by which a tube is judged."""
 
 PLAYED_MOTIONS = ('calibration', 'periodic', 'non_periodic', 'commissioning')
-"""Motions that the console plays."""
+"""Motions that the master plays."""
 
 FOLLOW_THE_HANDLE = 'master'
 PLAYS = ('motion', 'file')
-"""Sources of the console by which it moves the slave by itself."""
+"""Sources of the master by which it moves the slave by itself."""
 SOURCES = ('none', *PLAYS, FOLLOW_THE_HANDLE)
-"""Where the console's commands come from."""
+"""Where the master's commands come from."""
 
 WAIVABLE = ('motor/measured_js', 'wires/measured_js')
 """Topics that an explanation can do without where the caller says so."""

@@ -10,7 +10,7 @@ LET_GO = 'let go'
 SILENT = 'no sign of the operator'
 STALLED = 'this program was not run in time'
 """Reasons of its own why a dead-man is not held."""
-# So long ahead of what the console says that it wants the hand waits: it is at a limit.
+# So long ahead of what the master says that it wants the hand waits: it is at a limit.
 _LEAD_S = 0.2
 _LEAD_RAD = 0.002
 
@@ -73,8 +73,8 @@ class DeadMan:
 class RunningAngles:
     """Angles that run while a grip holds, stay over its end, and do not wind up at a limit.
 
-    What the console wants of the slave tells where a limit is, be it of the joint, of the tube or
-    of the console's own: the angles wait there, and turn round at once.
+    What the master wants of the slave tells where a limit is, be it of the joint, of the tube or
+    of the master's own: the angles wait there, and turn round at once.
     """
 
     def __init__(self, joints: int) -> None:
@@ -97,7 +97,7 @@ class RunningAngles:
 
         `usual` (J,) is the greatest speed in rad/s for which the slave is given time to follow,
         `elapsed` the time in s since the last call of this grip, `scale` slave motion for one
-        radian of the handle. `wanted` (J,) are the angles in rad that the console asks of the slave
+        radian of the handle. `wanted` (J,) are the angles in rad that the master asks of the slave
         now; None while it follows nobody: the angles do not move before it does, nor away from what
         it has reached.
         """

@@ -64,7 +64,7 @@ def test_one_lost_sample_is_no_gap(sound):
 
 
 def test_a_command_that_pauses_is_no_gap(sound):
-    """A console that rests publishes nothing; the last command stays in force."""
+    """A master that rests publishes nothing; the last command stays in force."""
     command = sound.command
     paused = (command.time > 5.0) & (command.time < 6.0)
     held = command.values[np.searchsorted(command.time, 5.0)]

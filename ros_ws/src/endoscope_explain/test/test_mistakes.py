@@ -129,7 +129,7 @@ def test_forces_of_another_rig_are_no_counts_of_a_converter(record):
 
 
 def test_a_pause_that_ends_at_another_pose_is_no_gap(record):
-    """A console that was let go begins anew where the rig is, not where it commanded last."""
+    """A master that was let go begins anew where the rig is, not where it commanded last."""
     sound = record()
     command = sound.command
     begin = int(np.searchsorted(command.time, 5.0))

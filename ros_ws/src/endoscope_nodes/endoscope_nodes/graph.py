@@ -15,17 +15,17 @@ from std_msgs.msg import String
 
 from endoscope_core.errors import FileError
 from endoscope_core.rig import load_rig
-from endoscope_nodes.names import MOTOR_MEASURED, OPERATING_STATE, STATE_COMMAND
+from endoscope_nodes.names import MASTER_NODE, MOTOR_MEASURED, OPERATING_STATE, STATE_COMMAND
 from endoscope_nodes.nodes.calibration import CalibrationNode
 from endoscope_nodes.nodes.compensator import CompensatorNode
-from endoscope_nodes.nodes.conductor import SelfStartingConductor
-from endoscope_nodes.nodes.console import ConsoleNode
 from endoscope_nodes.nodes.controller import ControllerNode
 from endoscope_nodes.nodes.em_tracker import EmTrackerNode
 from endoscope_nodes.nodes.instrument_model import InstrumentModelNode
 from endoscope_nodes.nodes.load_cells import LoadCellsNode
+from endoscope_nodes.nodes.master import MasterNode
 from endoscope_nodes.nodes.motor_driver import MotorDriverNode
 from endoscope_nodes.nodes.recorder import RecorderNode
+from endoscope_nodes.nodes.simulation_clock import SelfStartingClock
 from endoscope_nodes.nodes.supervisor import SupervisorNode
 from endoscope_nodes.program import CHECK, REAL_TIME, words_for_nobody
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
@@ -34,7 +34,7 @@ from endoscope_nodes.runtime.runtime import Runtime, run
 
 # The motor driver beats first: the plant advances under the command of the tick before.
 SLAVE_NODES = (MotorDriverNode, LoadCellsNode, EmTrackerNode, SupervisorNode)
-CONTROL_NODES = (CompensatorNode, ControllerNode, CalibrationNode, ConsoleNode)
+CONTROL_NODES = (CompensatorNode, ControllerNode, CalibrationNode, MasterNode)
 SHOWING_NODES = (InstrumentModelNode,)
 ALL_NODES = (*SLAVE_NODES, *CONTROL_NODES, *SHOWING_NODES, RecorderNode)
 
@@ -47,7 +47,7 @@ _FOUND_S, _ENABLED_S, _COUNTED_S = 2.0, 1.5, 4.0
 
 
 def compose(runtime: Runtime, real_time: bool = False) -> None:
-    """Add all nodes to an empty runtime, and in simulated time the conductor."""
+    """Add all nodes to an empty runtime, and in simulated time the clock."""
     # In lock-step a busy machine makes the simulated slave slower, and nothing else.
     if not real_time and _is_simulated(runtime):
         runtime.keep_lock_step(
@@ -62,7 +62,7 @@ def compose(runtime: Runtime, real_time: bool = False) -> None:
     for factory in ALL_NODES:
         runtime.add(factory)
     if runtime.ticker.simulated:
-        runtime.add(SelfStartingConductor)
+        runtime.add(SelfStartingClock)
 
 
 def _is_simulated(runtime: Runtime) -> bool:
@@ -102,7 +102,7 @@ def _carried(rate: int) -> tuple[float, str]:
     """Share of the commands of a played motion that reach the motors, and what ended it."""
     arguments = ['--ros-args', '--log-level', 'fatal', '-r', f'__ns:=/check_{os.getpid()}']
     arguments += ['-p', 'use_sim_time:=false', '-p', f'tick_rate:={rate}']
-    played = {'console': {'source': 'motion', 'motion': 'periodic'}}
+    played = {MASTER_NODE: {'source': 'motion', 'motion': 'periodic'}}
     with Runtime(arguments, Context(), overrides=played) as runtime:
         for factory in (*SLAVE_NODES, *CONTROL_NODES):
             runtime.add(factory)

@@ -4,6 +4,11 @@ JOINTS = ('bend_x', 'bend_y')
 MOTORS = ('motor_x', 'motor_y')
 WIRES = ('wire_x_pos', 'wire_x_neg', 'wire_y_pos', 'wire_y_neg')
 
+# Node names of the master and of the simulation clock, by which their parameters, permissions and
+# diagnostics go. All other nodes are named as their modules.
+MASTER_NODE = 'console'
+CLOCK_NODE = 'conductor'
+
 MASTER_MEASURED = 'master/measured_js'
 MASTER_CLUTCH = 'master/clutch'
 SLAVE_COMMAND = 'slave/servo_jp'

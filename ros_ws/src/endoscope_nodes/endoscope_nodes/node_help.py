@@ -45,7 +45,7 @@ def help_of(
     if len(nodes) > 1:
         parts += [_wrapped(f'{", ".join(nodes)}.', 'Nodes: ', ' ' * 7) + '\n', _TO_ONE_OF_MANY]
     else:
-        parts.append(''.join(f'{line}\n' for line in _interface(name)))
+        parts.append(''.join(f'{line}\n' for line in _interface(nodes[0])))
     parts += [_section(node, OF_NODE[node]) for node in nodes if OF_NODE[node]]
     parts.append(_section('of the whole process', OF_PROCESS))
     return '\n'.join([*parts, _END])

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from endoscope_core.exit_status import exit_status
+from endoscope_nodes import names
 from endoscope_nodes.runtime.stop_signals import end_when_asked
 
 REAL_TIME = '--real-time'
@@ -19,16 +20,17 @@ _HELP = ('-h', '--help')
 class Program:
     """One command of the package."""
 
-    name: str  # also of the node, if it runs a single one
+    name: str
     runs: str  # ``module:Node`` of this package, or ``module:function`` for several nodes
     purpose: str  # a sentence or two
-    composed: tuple[str, ...] = ()  # nodes that it runs; empty for the one of its name
+    composed: tuple[str, ...] = ()  # nodes that it runs; empty for a single one
     options: tuple[tuple[str, str], ...] = ()  # words of its own, and what each does
+    node: str = ''  # node name, where that is another
 
     @property
     def nodes(self) -> tuple[str, ...]:
-        """Nodes that it runs."""
-        return self.composed or (self.name,)
+        """Node names of what it runs."""
+        return self.composed or (self.node or self.name,)
 
     def __call__(self, argv: Sequence[str] | None = None) -> int:
         """Run it with a command line without its name (default: `sys.argv`); the exit status."""
@@ -63,6 +65,23 @@ class Program:
         return run_nodes([found])
 
 
+@dataclass(frozen=True)
+class OldName:
+    """A name by which a program can still be started, for one version."""
+
+    name: str
+    program: Program
+
+    def __call__(self, argv: Sequence[str] | None = None) -> int:
+        """Run the program, and say on stderr what it is called."""
+        print(
+            f'{self.name}: this program is called {self.program.name}; the name {self.name} goes '
+            'with the next version',
+            file=sys.stderr,
+        )
+        return self.program(argv)
+
+
 def words_for_nobody(argv: Sequence[str]) -> list[str]:
     """Return the words of a command line that are not ROS arguments."""
     # Those stand between --ros-args and -- or the end, as often as one likes; see
@@ -79,11 +98,12 @@ def words_for_nobody(argv: Sequence[str]) -> list[str]:
     return words
 
 
-console = Program(
-    'console',
-    'nodes.console:ConsoleNode',
+master = Program(
+    'master',
+    'nodes.master:MasterNode',
     'Turns the motion of the handle into commands while the clutch is held, or plays a motion or '
     'a file.',
+    node=names.MASTER_NODE,
 )
 motor_driver = Program(
     'motor_driver',
@@ -140,26 +160,31 @@ replay = Program(
     'nodes.replay:ReplayNode',
     'Publishes the topics of a bag again, at their pace or another, and ends.',
 )
-conductor = Program(
-    'conductor',
-    'nodes.conductor:SelfStartingConductor',
+simulation_clock = Program(
+    'simulation_clock',
+    'nodes.simulation_clock:SelfStartingClock',
     'Makes simulated time, a millisecond at a time, as fast as the graph can follow.',
+    node=names.CLOCK_NODE,
 )
+console = OldName('console', master)
+conductor = OldName('conductor', simulation_clock)
 
 _COMPOSED = (
     *(motor_driver, load_cells, em_tracker, supervisor),
-    *(compensator, controller, calibration, console, instrument_model, recorder),
+    *(compensator, controller, calibration, master, instrument_model, recorder),
 )
-NODES = tuple(program.name for program in (*_COMPOSED, replay, conductor))
-"""Names of all nodes that the package has."""
+PROGRAMS = {program.nodes[0]: program for program in (*_COMPOSED, replay, simulation_clock)}
+"""The program of each node of the package, by node name."""
+NODES = tuple(PROGRAMS)
+"""Node names of all that the package has."""
 
 graph = Program(
     'graph',
     'graph:main',
     'Runs all nodes in one process. Where all devices are simulated, it runs in lock-step with a '
-    'conductor, at real time where the machine can and slower where it cannot; -p speed:=0.0 lets '
-    'it go as fast as it can.',
-    tuple(program.name for program in (*_COMPOSED, conductor)),
+    'simulation clock, at real time where the machine can and slower where it cannot; '
+    '-p speed:=0.0 lets it go as fast as it can.',
+    tuple(program.nodes[0] for program in (*_COMPOSED, simulation_clock)),
     (
         (REAL_TIME, 'by the wall clock, as with a real device: a machine that is busy ends motion'),
         (CHECK, 'only say which rate this machine carries in real time, as busy as it is now'),

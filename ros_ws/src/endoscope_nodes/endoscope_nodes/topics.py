@@ -48,7 +48,7 @@ class Topic:
     offered: Qos | None  # None where the sender is not a node of this project
     asked: Qos
     said_by: tuple[str, ...] = ()
-    # Nodes; the recorder hears whatever is `recorded`, and the conductor waits for the streams.
+    # Nodes; the recorder hears whatever is `recorded`, the simulation clock waits for the streams.
     heard_by: tuple[str, ...] = ()
     recorded: bool = True  # unless the recorder is told otherwise
     one_sender: bool = False  # whoever else speaks here while the slave is enabled is a fault
@@ -87,7 +87,7 @@ TOPICS = (
         'sensor_msgs/msg/Joy',
         'on change and 10 Hz',
         '`buttons[0]` = 1: follow the handle, or go on with a motion that waits for it '
-        "(`hold_to_play`); the console's own while it plays any other motion",
+        "(`hold_to_play`); the master's own while it plays any other motion",
         offered=EVENT,
         asked=EVENT,
         said_by=('console',),
@@ -99,7 +99,7 @@ TOPICS = (
         _JOINT_STATE,
         _STREAM,
         'desired bending: `position` in rad and `velocity` in rad/s of `bend_x` and `bend_y`, '
-        "`header.frame_id` the motion session; the console's unless its source is `none`",
+        "`header.frame_id` the motion session; the master's unless its source is `none`",
         offered=COMMAND,
         asked=COMMAND,
         said_by=('console',),
@@ -180,7 +180,7 @@ TOPICS = (
         _JOINT_STATE,
         '1 kHz while it calibrates or goes home',
         '`position` in rad and `velocity` in rad/s of the shafts, divided by the gear; goes before '
-        'the console and passes uncompensated',
+        'the master and passes uncompensated',
         offered=COMMAND,
         asked=COMMAND,
         said_by=('calibration',),

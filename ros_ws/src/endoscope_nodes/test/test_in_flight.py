@@ -5,7 +5,7 @@ from rclpy.context import Context
 from std_msgs.msg import UInt64
 
 from endoscope_nodes.names import MOTOR_MEASURED, MOTORS
-from endoscope_nodes.nodes.conductor import ConductorNode
+from endoscope_nodes.nodes.simulation_clock import SimulationClockNode
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.qos import LOCK_STEP, SENSOR_OFFERED
 from endoscope_nodes.runtime.runtime import Runtime
@@ -33,7 +33,7 @@ def link(number):
                 self.ticker.add(self._begin)
 
         def _begin(self, stamp, _):
-            # The conductor hears this one at once, the last link hears of it late.
+            # The clock hears this one at once, the last link hears of it late.
             self._motors.publish(stamp, *(0.0,) * len(MOTORS))
             self._out.publish(UInt64(data=stamp))
 
@@ -51,8 +51,8 @@ def links():
     waits = {'conductor': {'wait_for': [MOTOR_MEASURED]}}
     with Runtime(arguments, Context(), 229, waits) as runtime:
         links = [runtime.add(link(number)) for number in range(HOPS)]
-        conductor = runtime.add(ConductorNode)
-        assert runtime.spin_until(conductor.advance(TICKS / 500), 60.0)
+        clock = runtime.add(SimulationClockNode)
+        assert runtime.spin_until(clock.advance(TICKS / 500), 60.0)
         yield links
 
 

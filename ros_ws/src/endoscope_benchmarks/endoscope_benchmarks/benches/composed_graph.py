@@ -17,8 +17,8 @@ from std_msgs.msg import String
 from endoscope_benchmarks.private_domain import process_domain
 from endoscope_core.safety import OperatingState
 from endoscope_nodes.graph import ALL_NODES
-from endoscope_nodes.names import STATE_COMMAND
-from endoscope_nodes.nodes.conductor import ConductorNode
+from endoscope_nodes.names import CLOCK_NODE, STATE_COMMAND
+from endoscope_nodes.nodes.simulation_clock import SimulationClockNode
 from endoscope_nodes.runtime.qos import EVENT
 from endoscope_nodes.runtime.runtime import Runtime
 
@@ -39,7 +39,7 @@ class ComposedFigure:
 
     seconds: float  # length of the measurement
     ticks: float  # share of the 1 kHz ticks that took place
-    # From the instant at which the console's tick was due to the motor driver's obeying it.
+    # From the instant at which the master's tick was due to the motor driver's obeying it.
     latency_p50_ms: float
     latency_p99_ms: float
     cores: float  # CPU time of the process per second
@@ -107,7 +107,7 @@ def run_lock_step_bench(seconds: float) -> float:
     with tempfile.TemporaryDirectory() as folder:
         bag = str(Path(folder) / 'bag')
         overrides = {'recorder': {'bag': bag}, 'console': _PLAYING}
-        graph = _Composition((*ALL_NODES, ConductorNode), overrides, _SIMULATED)
+        graph = _Composition((*ALL_NODES, SimulationClockNode), overrides, _SIMULATED)
         try:
             graph.advance(0.5)
             graph.enable()
@@ -177,7 +177,7 @@ class _Composition:
         return values
 
     def advance(self, seconds: float) -> None:
-        future = self.node('conductor').advance(seconds)
+        future = self.node(CLOCK_NODE).advance(seconds)
         self.runtime.spin_until(future, 10.0 * seconds + self._PATIENCE_S)
 
     def close(self) -> None:

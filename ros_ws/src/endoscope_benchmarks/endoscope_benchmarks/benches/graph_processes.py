@@ -29,7 +29,7 @@ class ProcessesFigure:
     cores: float  # CPU time of all processes per second
     load: float  # load average of the machine at the end
     state: str  # operating state at the end
-    # What became of the commands from node to node: how many the console sent, how many of them the
+    # What became of the commands from node to node: how many the master sent, how many of them the
     # compensator and the motor driver obeyed, and why the others were refused. What is missing
     # beyond the refusals was replaced by newer ones before it was read.
     hops: str
@@ -85,7 +85,7 @@ def run_processes_bench(rate: int, seconds: float) -> ProcessesFigure:
 
 
 def _hops(done: Counter[str]) -> str:
-    text = f'the console sent {done["sent"]}'
+    text = f'the master sent {done["sent"]}'
     for node in _OBEYING:
         refused = [f'{n} {key}' for key, n in done.items() if key.startswith(f'{node} refused')]
         text += ', '.join([f', {node} obeyed {done[f"{node} accepted"]}', *refused])

@@ -1,4 +1,4 @@
-"""`endoscope bench motor_faults`: what the slave does when motors or console fail, and how fast."""
+"""`endoscope bench motor_faults`: what the slave does when motors or master fail, and how fast."""
 
 import argparse
 import re
@@ -23,8 +23,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `motor_faults`."""
     parser = subparsers.add_parser(
         'motor_faults',
-        help='what the slave does when motors or console fail, and how fast',
-        description='Runs console, compensator, motor driver, supervisor and recorder on emulated '
+        help='what the slave does when motors or master fail, and how fast',
+        description='Runs master, compensator, motor driver, supervisor and recorder on emulated '
         'servos, breaks one thing after the other in motion, and prints a table. Exits 1 '
         'where the slave does not end as it must.',
     )

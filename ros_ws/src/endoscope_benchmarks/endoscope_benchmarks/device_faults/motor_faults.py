@@ -1,4 +1,4 @@
-"""The faults of motors and console, and what the slave makes of each."""
+"""The faults of motors and master, and what the slave makes of each."""
 
 import math
 import time

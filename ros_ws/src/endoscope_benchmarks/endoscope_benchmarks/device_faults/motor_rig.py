@@ -30,7 +30,7 @@ from endoscope_nodes.names import (
     WIRES_MEASURED,
 )
 from endoscope_nodes.nodes.compensator import CompensatorNode
-from endoscope_nodes.nodes.console import ConsoleNode
+from endoscope_nodes.nodes.master import MasterNode
 from endoscope_nodes.nodes.motor_driver import MotorDriverNode
 from endoscope_nodes.nodes.recorder import RecorderNode
 from endoscope_nodes.nodes.supervisor import SupervisorNode
@@ -47,14 +47,14 @@ _NODES: dict[str, type] = {
     'motor_driver': MotorDriverNode,
     'supervisor': SupervisorNode,
     'compensator': CompensatorNode,
-    'console': ConsoleNode,
+    'console': MasterNode,
 }
 
 
 class MotorRig(ClosedOnExit):
-    """Console, compensator, motor driver, supervisor and recorder, with two emulated servos.
+    """Master, compensator, motor driver, supervisor and recorder, with two emulated servos.
 
-    The console plays ``60 sin t``, which passes uncompensated. The tension of the wires is the
+    The master plays ``60 sin t``, which passes uncompensated. The tension of the wires is the
     rig's own to say. Nodes `apart` live in processes of their own, so that they can be killed.
     Silence of the servos for `patience` s is a fault. The folder takes the terminal's link and the
     bag.

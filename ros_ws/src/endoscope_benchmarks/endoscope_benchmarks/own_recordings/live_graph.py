@@ -16,9 +16,9 @@ from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_parameters import set_parameters
 from endoscope_nodes.client.handle_sender import HandleSender
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
-from endoscope_nodes.names import MOTOR_MEASURED
-from endoscope_nodes.nodes.conductor import ConductorNode
+from endoscope_nodes.names import CLOCK_NODE, MOTOR_MEASURED
 from endoscope_nodes.nodes.recorder import RecorderNode
+from endoscope_nodes.nodes.simulation_clock import SimulationClockNode
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.runtime import FOREVER_S, Runtime
 
@@ -52,7 +52,7 @@ class LiveGraph(ClosedOnExit):
             given['recorder'] = {'bag': str(bag)}
         if lock_step:
             # Load cells may fall silent.
-            given['conductor'] = {'timeout': PATIENCE_S, 'wait_for': [MOTOR_MEASURED]}
+            given[CLOCK_NODE] = {'timeout': PATIENCE_S, 'wait_for': [MOTOR_MEASURED]}
         arguments = ['--ros-args', '--log-level', 'fatal']
         arguments += ['-p', f'use_sim_time:={str(lock_step).lower()}']
         arguments += ['-p', f'tick_rate:={rate or RATE[lock_step]}']
@@ -65,7 +65,7 @@ class LiveGraph(ClosedOnExit):
             self.node = self._runtime.add(lambda runtime: EndoscopeNode('operator', runtime))
             self._pose = self._runtime.pose_of(self.node)
             self.client = GraphClient(self.node, self.advance, self.now)
-            self._conductor = self._runtime.add(ConductorNode) if lock_step else None
+            self._clock = self._runtime.add(SimulationClockNode) if lock_step else None
             self._runtime.prepare()
             self._connect()
         except BaseException:
@@ -86,10 +86,10 @@ class LiveGraph(ClosedOnExit):
 
     def advance(self, seconds: float) -> None:
         """Let time go on."""
-        if self._conductor is None:
+        if self._clock is None:
             self._runtime.spin_until(Future(), seconds)
             return
-        done = self._conductor.advance(seconds)
+        done = self._clock.advance(seconds)
         self._runtime.spin_until(done, FOREVER_S)
         done.result()
 

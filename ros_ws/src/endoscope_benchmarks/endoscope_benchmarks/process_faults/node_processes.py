@@ -105,4 +105,5 @@ def _run(name: str, words: list[str], domain: int, log: str) -> None:
         os.dup2(sink.fileno(), 2)
     os.environ['ROS_DOMAIN_ID'] = str(domain)
     sys.argv = [name, '--ros-args', *words]
-    sys.exit(getattr(program, name).start())
+    started = program.graph if name == GRAPH else program.PROGRAMS[name]
+    sys.exit(started.start())

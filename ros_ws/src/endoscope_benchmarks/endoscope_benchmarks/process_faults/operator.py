@@ -41,7 +41,7 @@ class Operator(ClosedOnExit):
     Nothing is sent or heard but in :meth:`serve`; what was heard is judged by its stamps.
 
     `domain`: ROS domain.
-    `source`: ``master``, ``outside``, or ``none`` where the console plays by itself.
+    `source`: ``master``, ``outside``, or ``none`` where the master plays by itself.
     `clutch`: whether the hand holds it.
     `shafts`, `goals`: what `motor/measured_js` and `motor/servo_jp` said.
     `sent`: commands sent to `slave/servo_jp`: session, stamp in ns, positions and velocities.

@@ -45,7 +45,7 @@ class ProcessFault:
     """Something that goes wrong in motion.
 
     `inject`: makes it happen.
-    `source`: whose motion it is: ``master`` for the handle, ``motion`` for one that the console
+    `source`: whose motion it is: ``master`` for the handle, ``motion`` for one that the master
         plays, ``outside`` for a program that writes `slave/servo_jp` itself.
     `kills`: process that is gone afterwards.
     `pauses`: whether the operator himself lets the slave stand and move again.

@@ -31,7 +31,7 @@ class ProcessRig(ClosedOnExit):
         self.bag = folder / 'bag'
         self._folder = folder
         self._bags = 0
-        self._console = 'master'
+        self._source = 'master'
         domain = private_domain()
         self.processes = NodeProcesses(domain, folder)
         self.operator = Operator(domain)
@@ -39,12 +39,12 @@ class ProcessRig(ClosedOnExit):
 
     def begin(self, source: str) -> None:
         """Have the graph run with a source of its motion; see `ProcessFault`."""
-        of_console = {'outside': 'none'}.get(source, source)
+        of_master = {'outside': 'none'}.get(source, source)
         holder = GRAPH if GRAPH in self.names else 'console'
-        if of_console != self._console or source == 'motion':
+        if of_master != self._source or source == 'motion':
             if holder in self.processes.running:
                 self.end(holder)
-            self._console = of_console
+            self._source = of_master
         changes_hands = self.operator.use('none' if source == 'motion' else source)
         self.operator.press(not changes_hands)
         self.revive()
@@ -68,7 +68,7 @@ class ProcessRig(ClosedOnExit):
         first = 'motor_driver' if name == GRAPH else name
         parameters: dict[str, dict[str, object]] = {first: {'tick_rate': self.rate}}
         if name in ('console', GRAPH):
-            parameters.setdefault('console', {})['source'] = self._console
+            parameters.setdefault('console', {})['source'] = self._source
         if name in ('controller', GRAPH):
             # What feedback adds to a motion would hide what a fault adds.
             parameters.setdefault('controller', {})['active'] = False

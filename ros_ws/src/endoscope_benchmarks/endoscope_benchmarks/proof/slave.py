@@ -20,14 +20,14 @@ from endoscope_nodes.names import JOINTS, SLAVE_COMMAND, SLAVE_MEASURED
 Array = NDArray[np.float64]
 
 EXPLAINED, JUDGED, TRACKED = 'commissioning', 'non_periodic', 'periodic'
-"""Motions of the console: that is explained, that the plants are judged on, that is compensated."""
+"""Motions of the master: that is explained, that the plants are judged on, that is compensated."""
 REST_S = 1.0
 """After a motion."""
 SMALLER, SLOWER = 0.4, 2.0
 """Factors on size and time of the tracked motion, 60 deg: its inverse would go beyond what the
 console plays, and jump by more at each reversal than it lets pass."""
 LATEST_S = 4.0
-"""Before a file, the console goes to its first angle."""
+"""Before a file, the master goes to its first angle."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Tracking:
 
 
 def record(plant: PlantDescription, motion: str, bag: Path, seed: int) -> None:
-    """Record a motion of the console, played on the slave that a plant describes."""
+    """Record a motion of the master, played on the slave that a plant describes."""
 
     def play(graph: LiveGraph) -> None:
         graph.set('console', source='motion', motion=motion, joints=list(JOINTS))
@@ -83,7 +83,7 @@ def tracked(slave: PlantDescription, known: PlantDescription, folder: Path, seed
 
 
 def _begin_ns(asked: JointStateSeries, command: Array) -> int:
-    """When the console, on its way to the first angle of a command (N, J) at first, began it."""
+    """When the master, on its way to the first angle of a command (N, J) at first, began it."""
     position = asked.select(JOINTS).require('position')
     since = (asked.stamp_ns - asked.stamp_ns[0]) * 1e-9
 

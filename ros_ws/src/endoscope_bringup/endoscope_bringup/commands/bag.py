@@ -15,7 +15,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         help='topics, counts, rates, duration, pauses, gaps and losses',
         description='Says what is in BAG, and what is missing from it. A periodic topic is silent '
         'where nothing comes for more than 2.5 periods by the stamps of the source. It paused if '
-        'nothing was published meanwhile, as a console does whose handle is not followed; it has a '
+        'nothing was published meanwhile, as the master does while it follows no handle; it has a '
         'gap if messages are missing there, or if nothing tells that none are. Lost are messages '
         'that were published and did not arrive ("?" where the recorder did not tell).',
     )

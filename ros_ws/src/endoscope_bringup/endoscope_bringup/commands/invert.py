@@ -20,7 +20,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'invert',
         help='plan the command under which a plant moves as desired',
         description='Inverts a plant with all its effects, such as `endoscope explain` exports, '
-        'for a motion that is known beforehand. The console plays FILE (source `file`); the '
+        'for a motion that is known beforehand. The master plays FILE (source `file`); the '
         "compensator's mode is `none` then.",
     )
     parser.add_argument(
@@ -31,7 +31,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         required=True,
         metavar='NAME|FILE|BAG',
         help='the motion desired of each joint: periodic, non_periodic, commissioning or '
-        'calibration; a CSV file as the console plays it: time in s, bend_x and bend_y in rad; '
+        'calibration; a CSV file as the master plays it: time in s, bend_x and bend_y in rad; '
         'or the desired angles of a bag, slave/servo_jp',
     )
     parser.add_argument(

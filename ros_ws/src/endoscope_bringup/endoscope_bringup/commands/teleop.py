@@ -54,7 +54,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument(
         '--scale',
         type=within(0.01, 10.0, float),
-        help="slave motion for one radian of the handle; default the console's own",
+        help="slave motion for one radian of the handle; default the master's own",
     )
     parser.add_argument(
         '--namespace', default='endoscope', help='of the graph (default: %(default)s)'

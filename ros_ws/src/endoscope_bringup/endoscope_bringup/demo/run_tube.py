@@ -30,9 +30,9 @@ from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import GraphError
 from endoscope_nodes.client.graph_parameters import set_parameters
 from endoscope_nodes.graph import CONTROL_NODES, SHOWING_NODES, SLAVE_NODES
-from endoscope_nodes.names import CALIBRATION_COMMAND, JOINTS
-from endoscope_nodes.nodes.conductor import ConductorNode
+from endoscope_nodes.names import CALIBRATION_COMMAND, CLOCK_NODE, JOINTS, MASTER_NODE
 from endoscope_nodes.nodes.recorder import RecorderNode
+from endoscope_nodes.nodes.simulation_clock import SimulationClockNode
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.runtime import FOREVER_S, Runtime
 
@@ -95,7 +95,7 @@ class _GraphSession:
                 # What feed-forward alone does is shown.
                 'controller': {'active': False},
                 # Identifying a plant compiles on a machine's first run, in one tick.
-                'conductor': {'timeout': PATIENCE_OF_TIME_S},
+                CLOCK_NODE: {'timeout': PATIENCE_OF_TIME_S},
             },
         )
         for factory in (*SLAVE_NODES, *CONTROL_NODES, *SHOWING_NODES):
@@ -105,7 +105,7 @@ class _GraphSession:
         self._client = GraphClient(self._node, self._advance, self._now)
         self._last_calibration_ns = 0
         self._client.listen(JointState, CALIBRATION_COMMAND, self._note_calibration)
-        self._conductor = None if real_time else self._runtime.add(ConductorNode)
+        self._clock = None if real_time else self._runtime.add(SimulationClockNode)
         self._runtime.prepare()
 
     def __enter__(self) -> '_GraphSession':
@@ -122,10 +122,10 @@ class _GraphSession:
         self._last_calibration_ns = seconds * 1_000_000_000 + nanoseconds
 
     def _advance(self, seconds: float) -> None:
-        if self._conductor is None:
+        if self._clock is None:
             self._runtime.spin_until(Future(), seconds)
             return
-        done = self._conductor.advance(seconds)
+        done = self._clock.advance(seconds)
         self._runtime.spin_until(done, FOREVER_S)
         done.result()
 
@@ -175,11 +175,11 @@ class _GraphSession:
         progress(f'tracking {MOTION_TITLE[motion]}, {method}')
         self._set('compensator', **COMPENSATOR[method])
         self._advance(SETTLING_S)
-        self._set('console', source='motion', motion=motion)
+        self._set(MASTER_NODE, source='motion', motion=motion)
         start = self._now()
         self._advance(APPROACH_S + motion_by_name(motion).duration)
         end = self._now()
-        self._set('console', source='none')
+        self._set(MASTER_NODE, source='none')
         return Segment(tube.name, motion, method, start, end)
 
     def _now(self) -> float:

@@ -60,7 +60,7 @@ def _row(client: GraphClient, name: str, topic: Topic | None) -> dict[str, Any]:
     senders = _senders(client, name)
     missing = []
     if topic is not None and topic.said_by != ('every node',):
-        # A console without a source of motion, and clocks of real time, have nothing to say.
+        # A master without a source of motion, and clocks of real time, have nothing to say.
         missing = [n for n in topic.said_by if n in client.nodes() and n not in senders]
     return {
         'topic': name,

@@ -6,14 +6,14 @@ from dataclasses import asdict
 from typing import Any
 
 from endoscope_nodes.client.graph_client import GraphClient
-from endoscope_nodes.client.graph_listener import CONSOLE, LOCK_STEP, RECORDER, Health
-from endoscope_nodes.names import FACTOR, JOINTS
+from endoscope_nodes.client.graph_listener import LOCK_STEP, MASTER, RECORDER, Health
+from endoscope_nodes.names import CLOCK_NODE, FACTOR, JOINTS
 from endoscope_nodes.program import NODES
 
 _LEVELS = ('ok', 'WARN', 'ERROR', 'STALE')
 _FULL_ROUND_S = 1.1
 # These say nothing on /diagnostics.
-_QUIET = ('conductor', 'replay')
+_QUIET = (CLOCK_NODE, 'replay')
 
 
 def status_of(client: GraphClient, patience_s: float) -> tuple[tuple[str, ...], dict[str, Any]]:
@@ -22,8 +22,8 @@ def status_of(client: GraphClient, patience_s: float) -> tuple[tuple[str, ...], 
     client.wait_until(lambda: False, _FULL_ROUND_S)
     client.wait_until(lambda: not _silent(client), patience_s)
     health, silent = client.health, _silent(client)
-    console, recorder = health.get(CONSOLE), health.get(RECORDER)
-    source = '' if console is None else console.values.get('source', '')
+    master, recorder = health.get(MASTER), health.get(RECORDER)
+    source = '' if master is None else master.values.get('source', '')
     bag = '' if recorder is None else recorder.values.get('bag', '')
     values = {
         'state': client.state,
@@ -44,7 +44,7 @@ def status_of(client: GraphClient, patience_s: float) -> tuple[tuple[str, ...], 
         *_entry('state', [_state(client)]),
         *_entry('session', [client.session or 'none']),
         *_entry('time', [_time(health.get(LOCK_STEP))]),
-        *_entry('console', [_console(source, console)]),
+        *_entry('console', [_master(source, master)]),
         *_entry('compensator', [client.compensator.message if client.compensator else 'silent']),
         *_entry('calibration', calibration_in_words(client.calibration)),
         *_entry('recorder', [_recorder(recorder)]),
@@ -81,7 +81,7 @@ def _time(said: Health | None) -> str:
     return 'real' if said is None else f'simulated, {said.message}'
 
 
-def _console(source: str, said: Health | None) -> str:
+def _master(source: str, said: Health | None) -> str:
     if said is None:
         return 'silent'
     return f'source {source}' + (f': {said.message}' if said.message != source else '')

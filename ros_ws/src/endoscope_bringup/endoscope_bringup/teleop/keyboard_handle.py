@@ -138,7 +138,7 @@ class _HeldKeys:
 
 
 class KeyboardHandle:
-    """A console handle whose angles run at a constant speed while a key is held.
+    """A handle whose angles run at a constant speed while a key is held.
 
     A held key is the dead-man. A terminal that tells presses from releases has the handle run from
     press to release, with two keys at once for both joints. One that does not has it run from the
@@ -173,7 +173,7 @@ class KeyboardHandle:
     ) -> Turn:
         """Take what was typed since the last turn, and say what the handle does now.
 
-        `hindrance` is what forbids motion, empty for nothing; `wanted` (J,) what the console asks
+        `hindrance` is what forbids motion, empty for nothing; `wanted` (J,) what the master asks
         of the slave now, in rad, None while it follows nobody: the handle does not move before it
         does, nor away from what it has reached; `scale` the slave's motion for one radian.
         """

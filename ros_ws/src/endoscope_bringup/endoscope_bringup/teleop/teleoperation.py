@@ -18,7 +18,7 @@ from endoscope_bringup.teleop.terminal import Terminal, TerminalLostError
 from endoscope_core.choices import FOLLOW_THE_HANDLE, PLAYS
 from endoscope_core.errors import printable
 from endoscope_nodes.client.graph_client import GraphClient
-from endoscope_nodes.client.graph_listener import CONSOLE, GraphError
+from endoscope_nodes.client.graph_listener import MASTER, GraphError
 from endoscope_nodes.client.graph_parameters import (
     read_parameter,
     request_parameters,
@@ -30,6 +30,7 @@ from endoscope_nodes.names import (
     JOINTS,
     MASTER_CLUTCH,
     MASTER_MEASURED,
+    MASTER_NODE,
     MOTOR_COMMAND,
     MOTORS,
     SLAVE_COMMAND,
@@ -52,8 +53,8 @@ _STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 def teleoperate(client: GraphClient, args: argparse.Namespace) -> int:
     """Move the slave by the terminal's keys until the operator has enough; the exit status."""
     client.find(args.timeout)
-    source = read_parameter(client, 'console.source', args.timeout).value
-    scale = read_parameter(client, 'console.scale', args.timeout).value
+    source = read_parameter(client, f'{MASTER_NODE}.source', args.timeout).value
+    scale = read_parameter(client, f'{MASTER_NODE}.scale', args.timeout).value
     _check_consent(source, args.take)
     with ExitStack() as stack:
         signals = stack.enter_context(_signals_noted())
@@ -66,7 +67,7 @@ def teleoperate(client: GraphClient, args: argparse.Namespace) -> int:
         if args.scale is not None:
             asked['scale'], before['scale'] = args.scale, scale
         if asked:
-            set_parameters(client, 'console', asked, args.timeout)
+            set_parameters(client, MASTER_NODE, asked, args.timeout)
         _wait_for_the_handles_place(client)
         sender = HandleSender(client.node)
         stack.callback(sender.close)
@@ -81,7 +82,7 @@ def _check_consent(source: str, taken: bool) -> None:
     if source == FOLLOW_THE_HANDLE or taken:
         return
     plays = '; what it plays ends' if source in PLAYS else ''
-    print(f'console.source is {source}: the console follows no handle.')
+    print(f'console.source is {source}: the master follows no handle.')
     try:
         answer = input(f'Set it to master until teleop ends{plays}? [y/N] ')
     except EOFError:
@@ -103,7 +104,7 @@ def _wait_for_the_handles_place(client: GraphClient) -> None:
 def _give_back(
     client: GraphClient, terminal: Terminal, before: dict[str, str | float], patience_s: float
 ) -> None:
-    """Set the console's parameters back; a motion does not restart with nobody looking."""
+    """Set the master's parameters back; a motion does not restart with nobody looking."""
     if not before:
         return
     # The supervisor has to know that this handle is gone.
@@ -112,7 +113,7 @@ def _give_back(
     if source in PLAYS and client.state == 'ENABLED':
         client.ask('pause', patience_s)
         terminal.say(f'paused: console.source {source} starts again when you resume')
-    set_parameters(client, 'console', before, patience_s)
+    set_parameters(client, MASTER_NODE, before, patience_s)
 
 
 class _Signals:
@@ -276,9 +277,9 @@ class _Teleoperation:
         if client.state != 'ENABLED':
             todo = {'DISABLED': 'E enables', 'PAUSED': 'E resumes'}.get(client.state, 'FAULT')
             return client.why or todo
-        console = client.health.get(CONSOLE)
-        if console is not None and console.received_ns > self._taken_ns + 2 * _SUPERVISED_NS:
-            source = console.values.get('source', FOLLOW_THE_HANDLE)
+        master = client.health.get(MASTER)
+        if master is not None and master.received_ns > self._taken_ns + 2 * _SUPERVISED_NS:
+            source = master.values.get('source', FOLLOW_THE_HANDLE)
             if source != FOLLOW_THE_HANDLE:
                 return f'console.source is {source}'
         if self._home is None and self._client.underway is not None:
@@ -303,10 +304,10 @@ class _Teleoperation:
             scale = min(_SCALES[1], max(_SCALES[0], self._scale * factor))
             self._scale_asked = scale
             self._before.setdefault('scale', self._scale)
-            self._setting = request_parameters(self._client, 'console', {'scale': scale})
+            self._setting = request_parameters(self._client, MASTER_NODE, {'scale': scale})
 
     def _settle(self) -> None:
-        """Take the console's answer about its scale."""
+        """Take the master's answer about its scale."""
         if self._setting is None:
             return
         self._client.serve(0.001)
@@ -341,9 +342,9 @@ class _Teleoperation:
             at_limit = [name for name, is_at in zip(JOINTS, turn.at_limit, strict=True) if is_at]
             if at_limit:
                 return f'{" and ".join(at_limit)} at its limit'
-            console = self._client.health.get(CONSOLE)
-            said = console.message if console is not None else 'silent'
-            return '' if follows else f'the console does not follow: {said}'
+            master = self._client.health.get(MASTER)
+            said = master.message if master is not None else 'silent'
+            return '' if follows else f'the master does not follow: {said}'
         return self._hindrance(time.time_ns()) or self._hand.dead_man.reason
 
 

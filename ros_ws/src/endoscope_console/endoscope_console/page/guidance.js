@@ -7,7 +7,7 @@ const REASONS = {
   released: 'let go', silent: 'no sign of the hand for 0.1 s', late: 'frames came late', order: 'frames out of order',
   malformed: 'a malformed frame', flood: 'too many frames', hidden: 'page hidden', unfocused: 'page not in front',
   closed: 'page closed', lost: 'controls lost', unplugged: 'gamepad unplugged', state: 'not enabled',
-  calibration: 'calibration', source: 'console follows something else', blind: 'picture too old',
+  calibration: 'calibration', source: 'master follows something else', blind: 'picture too old',
   stalled: 'the server was not run in time', 'hands on': 'let go first',
 };
 const PLAYED = { file: 'the experiment', motion: 'the motion' };
@@ -20,7 +20,7 @@ export function nameOf(client, state) {
   return state?.lease?.operators?.find(({ name }) => name === client)?.label ?? client ?? '';
 }
 
-/** What the console plays, in words; empty while it follows a hand. */
+/** What the master plays, in words; empty while it follows a hand. */
 export const played = (state) => PLAYED[state?.console?.source] ?? '';
 
 /** Whether the last grip was ended by something else than the hand. */

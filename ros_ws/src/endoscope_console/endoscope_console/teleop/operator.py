@@ -69,11 +69,11 @@ class Conditions:
     state_enabled: bool = False  # whether the operating state last heard is ``ENABLED``
     state_ns: int = 0  # when it was heard
     calibrating: bool = False  # whether a calibration or a way home has the slave
-    source: str = ''  # of the commands of the console
+    source: str = ''  # of the commands of the master
     # Number of each of the last pictures and when it was made, newest last; a picture stands here
     # before it is sent.
     pictures: tuple[tuple[int, int], ...] = ()
-    playing: bool = False  # whether the console plays a motion that needs the clutch held
+    playing: bool = False  # whether the master plays a motion that needs the clutch held
     session: str = ''  # another one may have begun unseen between two words on the state
 
 
@@ -141,7 +141,7 @@ class OperatorDeadMan:
         self._numbers = 0
         self._hands_off = False
         self._of_grip = (0, 0, False)
-        self._of_console = ('', False)
+        self._of_master = ('', False)
         self._of_session = ''
 
     @property
@@ -215,7 +215,7 @@ class OperatorDeadMan:
         assert frame is not None
         self.state, self.reason = DeadManState.ENGAGED, None
         self._of_grip = frame.grip, frame.source, frame.position_mode
-        self._of_console = conditions.source, conditions.playing
+        self._of_master = conditions.source, conditions.playing
         self._of_session = conditions.session
 
     def _open(self, reason: Reason) -> None:
@@ -256,9 +256,9 @@ class OperatorDeadMan:
             return Reason.STATE
         if conditions.calibrating:
             return Reason.CALIBRATION
-        of_console = conditions.source, conditions.playing
+        of_master = conditions.source, conditions.playing
         follows = conditions.source == FOLLOW_THE_HANDLE or conditions.playing
-        if not follows or (self.engaged and of_console != self._of_console):
+        if not follows or (self.engaged and of_master != self._of_master):
             return Reason.SOURCE
         # Whoever holds a device of the topic `joy` need not look at a page.
         if frame.source != Source.JOY and not _sees(frame.seen, now_ns, conditions.pictures):

@@ -12,7 +12,7 @@ _NS = 1e-9
 
 
 class PadHandle:
-    """A console handle whose angles follow a deflection or a drag while the clutch is held.
+    """A handle whose angles follow a deflection or a drag while the clutch is held.
 
     In speed mode the angles run, and do not wind up where the slave goes no further
     (:class:`RunningAngles`).  In position mode they follow what was dragged since the grip began,
@@ -46,7 +46,7 @@ class PadHandle:
     ) -> tuple[float, ...]:
         """Angles (J,) of the handle in rad; to be called at each beat.
 
-        `frame` is the newest one of the grip that is engaged; `wanted` (J,) what the console asks
+        `frame` is the newest one of the grip that is engaged; `wanted` (J,) what the master asks
         of the slave now, in rad; `scale` the slave's motion for one radian of the handle.
         """
         elapsed_ns = 0 if self._followed_ns is None else now_ns - self._followed_ns

@@ -1,4 +1,4 @@
-"""What a console handle says, at the graph's rate: smooth, quiet at rest, and referenced again."""
+"""What a handle says, at the graph's rate: smooth, quiet at rest, and referenced again."""
 
 from __future__ import annotations
 

@@ -104,7 +104,7 @@ class TensionFacts:
 
 @dataclass(frozen=True)
 class HandleFacts:
-    """The console's handle, in rad."""
+    """The operator's handle, in rad."""
 
     resolution: Annotated[float, within(0.0, 0.1)]  # one count of its encoders in rad
 

@@ -1,4 +1,4 @@
-"""Command files: a motion of the bending joints as a table that a console can play.
+"""Command files: a motion of the bending joints as a table that the master can play.
 
 CSV with a header line; the column `time` in s and one column in rad for each joint. Between its
 rows the angle is interpolated linearly.

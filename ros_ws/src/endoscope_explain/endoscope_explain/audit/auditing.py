@@ -114,7 +114,7 @@ def _without_commandless_times(recording: Recording, findings: list[Finding]) ->
     end = max(float(s.time[-1]) for s in every.values())
     gaps = {topic: stamps.find_gaps(s, start, end) for topic, s in every.items()}
     intervals = {topic: stamps.usual_interval(s.time) for topic, s in every.items()}
-    # A command is in force until the next one: a console that pauses, or whose clutch is released,
+    # A command is in force until the next one: a master that pauses, or whose clutch is released,
     # leaves nothing out. Only where the command has moved on meanwhile some of it is missing, and
     # not even there if the motors have rested: then it began again from another pose.
     lost = stamps.missing_in(recording.command, gaps[recording.command.topic])

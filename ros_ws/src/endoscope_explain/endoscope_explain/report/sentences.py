@@ -210,7 +210,7 @@ def next_step(case: ExplainedCase) -> str:
         return f'{_capital(case.audit.mistakes()[0].remedy)}.'
     if case.next_experiment is not None:
         rivals = _all(case.next_experiment.separates)
-        return f'Play next_experiment.csv on the console: it tells {rivals} apart.'
+        return f'Have the master play next_experiment.csv: it tells {rivals} apart.'
     ambiguous = next((e for e in case.effects if e.alternatives), None)
     if ambiguous is not None:
         return (

@@ -201,7 +201,7 @@ def write_report(case: ExplainedCase, folder: Path) -> None:
     if case.next_experiment is not None:
         experiment = case.next_experiment
         columns = dict(zip(experiment.joints, zip(*experiment.command, strict=True), strict=True))
-        # A console plays all joints; one that was not recorded stays at zero.
+        # The master plays all joints; one that was not recorded stays at zero.
         joints = tuple(dict.fromkeys((*JOINTS, *experiment.joints)))
         still = (0.0,) * len(experiment.time)
         command = list(zip(*(columns.get(joint, still) for joint in joints), strict=True))

@@ -24,8 +24,8 @@ PATIENCE_S = 20.0
 POLL_S = 0.05
 SUPERVISOR = 'supervisor: operating state'
 RECORDER = 'recorder: recording'
-CONSOLE = 'console: commands'
-LOCK_STEP = 'conductor: lock-step'
+MASTER = f'{names.MASTER_NODE}: commands'
+LOCK_STEP = f'{names.CLOCK_NODE}: lock-step'
 COMMANDS = ('compensator: commands', 'compensator: calibration commands', 'motor_driver: commands')
 # A graph that simulates slower still counts as one that has stopped.
 _SLOWEST = 0.1

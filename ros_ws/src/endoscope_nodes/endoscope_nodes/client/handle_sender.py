@@ -1,4 +1,4 @@
-"""Speaks for a console handle: where it is, and whether its clutch is held."""
+"""Speaks for a handle: where it is, and whether its clutch is held."""
 
 from collections.abc import Sequence
 

@@ -66,7 +66,7 @@ class CalibrationNode(EndoscopeNode):
     The service answers at once, with the reason if it refuses. How far an order is follows on
     ``calibration/feedback``, the result on its topic, and as numbers for programs that plot.
     Whatever makes the recording worthless or motion doubtful aborts: the commands stop, the
-    slave holds or goes back to the console by a ramp, and the result says why. Tensions unlike
+    slave holds or goes back to the master by a ramp, and the result says why. Tensions unlike
     any known are refused: the result names no class, and nothing is compensated.
     """
 

@@ -37,7 +37,6 @@ from endoscope_nodes.runtime.ticker import TICK_S
 from endoscope_nodes.safety.sessions import TURN_S, ClutchWatch, CommandInput, SessionWatch
 from endoscope_nodes.safety.streams import CommandReport
 
-CONSOLE = 'console'
 CALIBRATION = 'calibration'
 NOBODY = 'nobody'
 
@@ -57,9 +56,9 @@ class CompensatorNode(EndoscopeNode):
     """The only publisher of ``motor/servo_jp``.
 
     It obeys commands and corrections of the motion session that it takes part in, each from one
-    sender.  Calibration goes before the console while its commands are fresh, and passes
+    sender.  Calibration goes before the master while its commands are fresh, and passes
     uncompensated.  Every stream begins at the measured pose, and the motors go on from where they
-    are, whatever changes: source, model, parameters or feedback.  A console that falls silent while
+    are, whatever changes: source, model, parameters or feedback.  A master that falls silent while
     the clutch is held ends the session.
     """
 
@@ -114,7 +113,7 @@ class CompensatorNode(EndoscopeNode):
         self._pose = context.pose_of(self)
         for topic, gate, take in (
             (names.CALIBRATION_COMMAND, self.calibration_gate, self._on_calibration),
-            (names.SLAVE_COMMAND, self.gate, self._on_console),
+            (names.SLAVE_COMMAND, self.gate, self._on_master),
             (names.CORRECTION, self.correction_gate, self._on_correction),
         ):
             CommandInput(self, self._session, topic, gate, take)
@@ -200,12 +199,12 @@ class CompensatorNode(EndoscopeNode):
     def _end_stream(self) -> None:
         """The clutch was let go of: whatever is commanded after it begins at the measured pose."""
         self.gate.reset()
-        if self._source == CONSOLE:
+        if self._source == names.MASTER_NODE:
             self._source = NOBODY
 
     def _watch_motion(self) -> None:
         now = self.ticker.monotonic_ns()
-        if self._source == CONSOLE and not self.gate.is_fresh(now):
+        if self._source == names.MASTER_NODE and not self.gate.is_fresh(now):
             self._source = NOBODY
             if self._clutch.held:
                 said = f' ({self.gate.last_reason})' if self.gate.last_reason else ''
@@ -234,13 +233,13 @@ class CompensatorNode(EndoscopeNode):
         if self.correction_gate.check(sample.stamp_ns, sample.position, now, _AT_ZERO) is None:
             self._corrections = (self._corrections[1], sample)
 
-    def _on_console(self, sample: JointSample) -> None:
+    def _on_master(self, sample: JointSample) -> None:
         if self.calibration_gate.is_fresh(self.ticker.monotonic_ns()):
             return
         if not self._clutch.held:
             self.gate.refuse(Refusal.CLUTCH)
             return
-        step = self._obey(CONSOLE, self.gate, sample, self._pose.bending())
+        step = self._obey(names.MASTER_NODE, self.gate, sample, self._pose.bending())
         if step is None:
             return
         correction = self._correction(sample.stamp_ns)

@@ -35,7 +35,7 @@ _NOTHING = np.zeros(len(names.JOINTS))
 class ControllerNode(EndoscopeNode):
     """Publishes ``controller/correction_js``, to be added to the joint-equivalent motor command.
 
-    It answers every command of the console that may be obeyed, with a correction of zero while it
+    It answers every command of the master that may be obeyed, with a correction of zero while it
     does not act: without a fresh tracker, during a calibration, or when it is not active.
     """
 

@@ -12,6 +12,7 @@ from rclpy.subscription import Subscription
 from rclpy.time import Time
 from std_srvs.srv import Trigger
 
+from endoscope_nodes.names import CLOCK_NODE
 from endoscope_nodes.runtime.declared_parameters import declare_parameters
 from endoscope_nodes.runtime.diagnostics import Diagnostics
 from endoscope_nodes.runtime.node_context import NAMESPACE, NodeContext
@@ -30,7 +31,7 @@ class EndoscopeNode(Node):
         )
         self.exit_code = 0  # what the process should say when it ends
         self.given: dict[str, object] = {}  # values of its parameters that are not the defaults
-        self._by_default = context.chosen if name == 'conductor' else {}
+        self._by_default = context.chosen if name == CLOCK_NODE else {}
         self._matched: list[rclpy_implementation.EventHandle] = []
         self.ticker = context.ticker_of(self)  # shared, as the rig, by all nodes of the process
         self.rig = context.rig

@@ -13,7 +13,7 @@ from endoscope_core.physics import PlantDescription, load_plant
 from endoscope_core.physics.effect import Stage
 from endoscope_core.physics.effects import describe
 from endoscope_core.rig import Rig, load_rig
-from endoscope_nodes.names import CLOCK, JOINTS
+from endoscope_nodes.names import CLOCK, CLOCK_NODE, JOINTS
 from endoscope_nodes.runtime.declared_parameters import check_sections, declare_parameters
 from endoscope_nodes.runtime.measured_pose import MeasuredPose
 from endoscope_nodes.runtime.node_parameters import BeatParameters, RealTimeParameters
@@ -95,7 +95,7 @@ class NodeContext:
         self.process_parameters: dict[str, object] = {}  # of the whole process, not the defaults
         self._real_time = RealTimeParameters()
         self._overrides = overrides or {}
-        # The conductor's, in a lock-step that nobody has asked for.
+        # The simulation clock's, in a lock-step that nobody has asked for.
         self.chosen: dict[str, object] = {}
         self.clock = CLOCK  # topic of the simulated time
         self._stop = Future()
@@ -121,10 +121,10 @@ class NodeContext:
         finally:
             node.destroy_node()
 
-    def keep_lock_step(self, conductor: Mapping[str, object]) -> None:
+    def keep_lock_step(self, clock: Mapping[str, object]) -> None:
         """Simulate time though nobody has asked for it; call it before the first node is added."""
-        self.chosen = {**conductor, **self.given('conductor')}
-        with self._asked('conductor') as node:
+        self.chosen = {**clock, **self.given(CLOCK_NODE)}
+        with self._asked(CLOCK_NODE) as node:
             # Two rigs of a domain do not share a clock.
             if node.get_namespace() != f'/{NAMESPACE}':
                 self.clock = CLOCK.strip('/')
@@ -132,7 +132,7 @@ class NodeContext:
     def overrides_of(self, name: str) -> list[Parameter]:
         """Parameter values that this process was told to give the node called ``name``."""
         values: dict[str, object] = {'use_sim_time': True} if self.chosen else {}
-        values |= self.chosen if name == 'conductor' else {}
+        values |= self.chosen if name == CLOCK_NODE else {}
         values |= self._overrides.get(name, {})
         return [Parameter(key, value=value) for key, value in values.items()]
 

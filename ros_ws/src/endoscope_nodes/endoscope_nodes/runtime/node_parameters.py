@@ -20,7 +20,7 @@ FOLLOWED = (
     names.MOTOR_MEASURED,
     names.WIRES_MEASURED,
 )
-"""Streams that the conductor can wait for."""
+"""Streams that the simulation clock can wait for."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class BeatParameters:
 
     tick_rate: int = parameter(
         1000,
-        'beats of this process, or of /clock where it has the conductor; a divisor of 1000',
+        'beats of this process, or of /clock where it has the simulation clock; a divisor of 1000',
         unit='Hz',
         low=10,
         high=1000,
@@ -186,7 +186,7 @@ class CalibrationParameters:
     identify_plant: bool = parameter(
         True,
         'whether to identify the plant of each joint from the tensions too: it tells how far the '
-        'tube lets the tip be bent, which console and compensator keep to, and the physical modes '
+        'tube lets the tip be bent, which master and compensator keep to, and the physical modes '
         'of the compensator can be selected by it; half a second of computing',
     )
     return_speed: float = parameter(
@@ -258,8 +258,8 @@ class ControllerParameters:
 
 
 @dataclass(frozen=True)
-class ConsoleParameters:
-    """Parameters of the console."""
+class MasterParameters:
+    """Parameters of the master."""
 
     source: str = parameter(
         'none',
@@ -327,8 +327,8 @@ class ReplayParameters:
 
 
 @dataclass(frozen=True)
-class ConductorParameters:
-    """Parameters of the conductor."""
+class SimulationClockParameters:
+    """Parameters of the simulation clock."""
 
     wait_for: tuple[str, ...] = parameter(
         (names.MOTOR_MEASURED, names.WIRES_MEASURED),
@@ -371,10 +371,10 @@ OF_NODE: dict[str, tuple[type, ...]] = {
     'compensator': (CompensatorParameters,),
     'controller': (ControllerParameters,),
     'calibration': (CalibrationParameters,),
-    'console': (ConsoleParameters,),
+    names.MASTER_NODE: (MasterParameters,),
     'instrument_model': (),
     'recorder': (RecorderParameters,),
     'replay': (ReplayParameters,),
-    'conductor': (ConductorParameters,),
+    names.CLOCK_NODE: (SimulationClockParameters,),
 }
 """What each node declares."""

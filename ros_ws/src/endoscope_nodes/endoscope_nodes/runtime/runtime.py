@@ -64,7 +64,7 @@ class Runtime(NodeContext, ClosedOnExit):
     Examples
     --------
     >>> with Runtime() as runtime:            # doctest: +SKIP
-    ...     runtime.add(ConsoleNode)
+    ...     runtime.add(MasterNode)
     ...     runtime.spin()
     """
 

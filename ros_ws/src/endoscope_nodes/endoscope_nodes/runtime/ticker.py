@@ -91,8 +91,8 @@ class Ticker:
     """Calls its listeners at each beat and says how many milliseconds went by.
 
     In real time a timer of the steady clock beats; in simulated time each message on ``/clock`` is
-    a beat, so that a conductor can run the whole graph in lock-step. One ticker serves all nodes of
-    a process, because a timer or a subscription of each node's own would cost more than most nodes
+    a beat, so that one clock can run the whole graph in lock-step. One ticker serves all nodes of a
+    process, because a timer or a subscription of each node's own would cost more than most nodes
     do. `stride`, from beat to beat, is in ms; simulated time beats as its clock does.
     """
 

@@ -15,7 +15,7 @@ from endoscope_nodes.runtime.streams import JointSample, JointSubscription
 
 SESSION_REPORT = 'motion session'
 TURN_S = 0.04
-# The clutch is repeated at 10 Hz; three missed repetitions mean that the console is gone.
+# The clutch is repeated at 10 Hz; three missed repetitions mean that its sender is gone.
 CLUTCH_TIMEOUT_NS = 350_000_000
 
 

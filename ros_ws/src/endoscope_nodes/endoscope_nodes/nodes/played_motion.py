@@ -1,4 +1,4 @@
-"""Commands that the console plays: a named motion or a file, sampled once, read tick by tick."""
+"""Motions that the master plays: a named motion or a file, sampled once, read tick by tick."""
 
 import math
 from collections.abc import Sequence

@@ -23,7 +23,7 @@ from endoscope_core.safety.motion_session import STALL_NS
 from endoscope_nodes import names
 from endoscope_nodes.client.calibration_result import findings_of, is_of_no_class
 from endoscope_nodes.client.handle_sender import CLUTCH_PERIOD_NS, clutch_message
-from endoscope_nodes.nodes.console_motion import (
+from endoscope_nodes.nodes.played_motion import (
     SampledMotion,
     approach,
     load_command_file,
@@ -32,7 +32,7 @@ from endoscope_nodes.nodes.console_motion import (
 from endoscope_nodes.runtime.diagnostics import OK, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
-from endoscope_nodes.runtime.node_parameters import ConsoleParameters
+from endoscope_nodes.runtime.node_parameters import MasterParameters
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import COMMAND, EVENT, RESULT, SENSOR_ASKED
 from endoscope_nodes.runtime.streams import JointPublisher, JointSample, JointSubscription
@@ -47,19 +47,19 @@ WAITING = 'goes on while the clutch is held'
 """Message of the diagnostics while a motion waits for the operator's hand."""
 
 
-class ConsoleNode(EndoscopeNode):
+class MasterNode(EndoscopeNode):
     """Publishes ``slave/servo_jp`` at 1 kHz, and ``master/clutch`` while it plays.
 
     It moves the slave only in a motion session, and every time from the measured pose: a motion is
     approached from there, goes on where it stood still, and is held at its end; a handle is
     followed from there whenever the clutch is engaged or the handle was silent. While a
-    calibration or a way home has the slave, the console rests. With source ``none`` it leaves both
+    calibration or a way home has the slave, the master rests. With source ``none`` it leaves both
     topics to somebody else. With ``hold_to_play`` it leaves him the clutch alone, and plays while
     that is held.
     """
 
     def __init__(self, context: NodeContext) -> None:
-        super().__init__('console', context)
+        super().__init__(names.MASTER_NODE, context)
         self._played: SampledMotion | None = None
         self._next = 0
         self._approach: SampledMotion | None = None
@@ -84,7 +84,7 @@ class ConsoleNode(EndoscopeNode):
         )
         self._playing_shaper = MotionShaper(limits)
         self._hand_shaper = MotionShaper(hand_limits)
-        self._settings = self.parameters(ConsoleParameters, self._on_parameters, self._load)
+        self._settings = self.parameters(MasterParameters, self._on_parameters, self._load)
         self._handle = Handle(
             limits.low,
             limits.high,
@@ -119,17 +119,19 @@ class ConsoleNode(EndoscopeNode):
         """Whether the motion or file has been played to its end."""
         return self._played is not None and self._next >= len(self._played)
 
-    def _load(self, parameters: ConsoleParameters) -> SampledMotion | None:
+    def _load(self, parameters: MasterParameters) -> SampledMotion | None:
         if parameters.source == 'motion':
             return sample_motion(parameters.motion, parameters.joints, TICK_S)
         if parameters.source == 'file':
             try:
                 return load_command_file(Path(parameters.command_file), TICK_S)
             except FileError as error:
-                raise ParameterError(f"console: parameter 'command_file': {error}") from error
+                raise ParameterError(
+                    f"{names.MASTER_NODE}: parameter 'command_file': {error}"
+                ) from error
         return None
 
-    def _on_parameters(self, parameters: ConsoleParameters) -> None:
+    def _on_parameters(self, parameters: MasterParameters) -> None:
         self._settings = parameters
         self._rest()
         self._next = 0
@@ -186,8 +188,8 @@ class ConsoleNode(EndoscopeNode):
             return ''
         return (
             f'the handle {"moves" if moves else "has its clutch held"} and nothing follows it: '
-            f"the console's source is {source}; "
-            + self.operate(f'set console.source {FOLLOW_THE_HANDLE}')
+            f"the master's source is {source}; "
+            + self.operate(f'set {names.MASTER_NODE}.source {FOLLOW_THE_HANDLE}')
         )
 
     def _on_result(self, message: DiagnosticArray) -> None:

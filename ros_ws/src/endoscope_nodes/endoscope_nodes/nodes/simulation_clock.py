@@ -13,11 +13,11 @@ from sensor_msgs.msg import JointState
 
 from endoscope_bags.cdr_encoding import encode_clock
 from endoscope_core.errors import EndoscopeError
-from endoscope_nodes.names import FACTOR, SLAVE_MEASURED
+from endoscope_nodes.names import CLOCK_NODE, FACTOR, SLAVE_MEASURED
 from endoscope_nodes.runtime.diagnostics import OK, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
-from endoscope_nodes.runtime.node_parameters import FOLLOWED, ConductorParameters
+from endoscope_nodes.runtime.node_parameters import FOLLOWED, SimulationClockParameters
 from endoscope_nodes.runtime.qos import LOCK_STEP
 from endoscope_nodes.runtime.ticker import SampleClock
 
@@ -32,7 +32,7 @@ class BarrierTimeout(EndoscopeError, TimeoutError):
     """A topic did not answer a tick; the message names it."""
 
 
-class ConductorNode(EndoscopeNode):
+class SimulationClockNode(EndoscopeNode):
     """Publishes ``/clock`` in lock-step with the graph.
 
     The next tick comes once every topic of ``wait_for``, and every other stream of another process
@@ -44,8 +44,8 @@ class ConductorNode(EndoscopeNode):
     """
 
     def __init__(self, context: NodeContext) -> None:
-        super().__init__('conductor', context)
-        p = self.parameters(ConductorParameters)
+        super().__init__(CLOCK_NODE, context)
+        p = self.parameters(SimulationClockParameters)
         self._process = context
         self._settings = p
         self._tick_ns = 1_000_000_000 // self.ticker.rate
@@ -162,7 +162,7 @@ class ConductorNode(EndoscopeNode):
         self.failure = BarrierTimeout(
             f'simulated time stands still at {self._now_ns * 1e-9:.3f} s: waited '
             f'{self._settings.timeout:g} s for {topics}; start the node that publishes it, or '
-            "leave it out of the conductor's parameter 'wait_for'"
+            f'leave it out of {CLOCK_NODE}.wait_for'
         )
         self.exit_code = 1
         future, self._future = self._future, None
@@ -186,8 +186,8 @@ class ConductorNode(EndoscopeNode):
         return OK, said, {'ticks': self.ticks, FACTOR: factor, 'speed': speed}
 
 
-class SelfStartingConductor(ConductorNode):
-    """A conductor that begins by itself once its topics exist, for a process of its own."""
+class SelfStartingClock(SimulationClockNode):
+    """A clock that begins by itself once its topics exist, for a process of its own."""
 
     def __init__(self, context: NodeContext) -> None:
         super().__init__(context)
