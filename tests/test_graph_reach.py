@@ -8,7 +8,7 @@ from commanded_graph import Sender
 from simulated_graph import TICK_RATE, SimulatedGraph
 from tubes import tube_of_size
 
-from endoscope_core.control import Reach, reach
+from endoscope_core.control import BendingRange, bending_range
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.physics import load_plant
 from endoscope_core.rig import shipped_rig
@@ -44,7 +44,7 @@ def test_a_calibration_finds_the_reach_and_the_console_keeps_to_it(tmp_path):
         found = [
             [float(values[f'reach.{joint}.{end}']) for end in ('low', 'high')] for joint in JOINTS
         ]
-        true = [(tube.low, tube.high) for tube in map(reach, plant.joints.values())]
+        true = [(tube.low, tube.high) for tube in map(bending_range, plant.joints.values())]
         np.testing.assert_allclose(np.degrees(found), np.degrees(true), atol=5.0)
         commands = graph.listen(SLAVE_COMMAND)
         graph.set('console', source='motion')
@@ -60,7 +60,9 @@ def test_the_compensator_cuts_what_a_console_asks_for_beyond_it():
     with SimulatedGraph(overrides=overrides) as graph:
         gear = graph.nodes['compensator'].rig.joints.gear
         graph.enable()
-        graph.nodes['compensator'].findings = CalibrationFindings(reaches=(Reach(-0.2, 0.3),) * 2)
+        graph.nodes['compensator'].findings = CalibrationFindings(
+            ranges=(BendingRange(-0.2, 0.3),) * 2
+        )
         asked, drives = graph.listen(SLAVE_COMMAND), graph.listen(MOTOR_COMMAND, MOTORS)
         graph.set('console', source='motion')
         graph.advance(2.5)

@@ -12,7 +12,13 @@ from numpy.testing import assert_allclose
 
 from endoscope_benchmarks.proof import sliding_nodes
 from endoscope_core.classifier.weights_file import load_classifier
-from endoscope_core.control import DesiredMotion, Feedforward, FeedforwardLaw, reach, shipped_limits
+from endoscope_core.control import (
+    DesiredMotion,
+    Feedforward,
+    FeedforwardLaw,
+    bending_range,
+    shipped_limits,
+)
 from endoscope_core.dataset import configuration_of_size, random_instrument
 from endoscope_core.dataset.rig_variation import calibration_command
 from endoscope_core.identification.law_choice import CalibrationFindings, LawChoice
@@ -86,7 +92,7 @@ def rmse_of_methods(seed, size_deg):
     plants = plants_of_calibration(asked, read, shipped_limits().gear)
     findings = CalibrationFindings(verdict.class_deg, verdict.expected_size, plants)
 
-    reached = reach(joint)
+    reached = bending_range(joint)
     signal = periodic_signal()
     most = 0.8 * min(-reached.low, reached.high) / np.deg2rad(60.0)
     signal = signal.scaled(min(1.0, most))

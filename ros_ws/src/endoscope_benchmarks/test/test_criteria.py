@@ -50,7 +50,9 @@ def bank():
 
 def test_criteria_follow_from_the_cases(bank):
     found = derived(bank)
-    assert pytest.approx(1.0, abs=0.1) == found.REACH, 'intervals are as wide as they should be'
+    assert pytest.approx(1.0, abs=0.1) == found.INTERVAL_WIDTH, (
+        'intervals are as wide as they should be'
+    )
     assert 1.0 < found.BEYOND_FORM < 1.2
     assert found.CERTAINTY[:2] == pytest.approx(WEIGHTS[:2], abs=0.4)
 
@@ -76,7 +78,7 @@ def test_the_module_holds_the_criteria_and_half_of_them_is_shown_to_be_worse(ban
     exec(source(found, 'a test'), names)
     for name, value in vars(found).items():
         assert names[name] == pytest.approx(value, rel=0.01, abs=1e-12)
-    reach = next(line for line in sensitivity(bank, found).splitlines() if 'REACH' in line)
+    reach = next(line for line in sensitivity(bank, found).splitlines() if 'INTERVAL_WIDTH' in line)
     assert ': 90%' in reach
 
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from play_loop import play
 
-from endoscope_core.control import MotorLimits, reach, shipped_limits
+from endoscope_core.control import MotorLimits, bending_range, shipped_limits
 from endoscope_core.control.internal_model import InternalModel, TurningPoints
 from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_core.physics.simulator import simulate
@@ -64,16 +64,16 @@ def test_the_reach_is_what_a_slow_swing_of_the_motor_reaches(exponent):
     swing = LIMITS.travel * np.sin(0.2 * time)
     run = simulate(PlantDescription(joints={'bend_x': joint}), swing[:, None], 5e-3)
     steady = run.bending_true[time > 40.0]
-    found = reach(joint)
+    found = bending_range(joint)
     assert found.low == pytest.approx(np.min(steady), abs=1e-3)
     assert found.high == pytest.approx(np.max(steady), abs=1e-3)
 
 
 def test_a_tighter_tube_or_a_weaker_wire_reaches_less():
     joint = JointParameters()
-    whole = reach(joint)
-    weak = reach(joint, MotorLimits(gear=0.5, travel=1.5, speed=4.8, tension=12.0))
-    tight = reach(replace(joint, capstan_exponent=1.4))
+    whole = bending_range(joint)
+    weak = bending_range(joint, MotorLimits(gear=0.5, travel=1.5, speed=4.8, tension=12.0))
+    tight = bending_range(replace(joint, capstan_exponent=1.4))
     assert 0.0 < weak.high < 0.8 * whole.high
     assert 0.0 < tight.high < 0.8 * whole.high
     assert whole.low == pytest.approx(-whole.high, abs=1e-3)

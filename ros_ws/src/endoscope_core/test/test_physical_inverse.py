@@ -13,7 +13,7 @@ from endoscope_core.control import (
     MotorLimits,
     PhysicalInverse,
     PhysicalParameters,
-    reach,
+    bending_range,
     shipped_limits,
 )
 from endoscope_core.physics.description import JointParameters, PlantDescription
@@ -46,7 +46,7 @@ def simulated(joint, command):
 @pytest.mark.parametrize('exponent', [0.5, 0.9, 1.4])
 def test_a_plant_that_is_known_is_followed(exponent, signal):
     joint = replace(JOINT, capstan_exponent=exponent)
-    reached = reach(joint)
+    reached = bending_range(joint)
     most = np.max(np.abs(signal(np.arange(0.0, signal.duration, 0.01))[0]))
     signal = signal.scaled(min(1.0, 0.8 * min(-reached.low, reached.high) / most))
     time = np.arange(0.0, signal.steady[1], TICK)
@@ -93,7 +93,7 @@ def test_a_tube_that_does_not_reach_so_far_is_pulled_no_further_than_allowed():
     tip, tension = simulated(joint, command)
     assert np.max(tension) < 15.05
     assert np.max(np.abs(np.diff(command))) < 4.8 / 0.5 * TICK + 1e-9
-    bound = reach(joint, limits)
+    bound = bending_range(joint, limits)
     after = time > 6.5
     assert np.max(tip[after]) == pytest.approx(bound.high, rel=0.02)
     assert np.min(tip[after]) == pytest.approx(bound.low, rel=0.02)

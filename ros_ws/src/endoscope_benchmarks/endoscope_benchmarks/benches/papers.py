@@ -15,8 +15,8 @@ TABLES = {
     'nearest_class': 'Table 4: RMSE of the actual angle, class against colon shape, deg',
     'colon_shapes': 'Table 5: RMSE and backlash, none against compensated, deg',
     'compensators': 'RMSE left on tubes never seen in fitting, % of the uncompensated; signals '
-    'scaled to 80 % of the reach of the tube where that is less',
-    'reach': 'Reach told by the 9 s calibration, to both sides, % off the true one',
+    'scaled to 80 % of the bending range of the tube where that is less',
+    'reach': 'Bending range told by the 9 s calibration, to both sides, % off the true one',
     'changing_tube': 'Second paper: RMSE left of 60 sin t, % of the uncompensated, the tube bent '
     'at 10 s',
     'calibration_time': 'Calibration, from request to compensated motion, s',

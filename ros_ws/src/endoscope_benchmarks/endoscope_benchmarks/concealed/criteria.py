@@ -34,7 +34,7 @@ class Criteria:
     """Deciding numbers; their meaning is in `endoscope_explain.criteria`."""
 
     BEYOND_FORM: float
-    REACH: float
+    INTERVAL_WIDTH: float
     CERTAINTY: tuple[float, float, float]
 
 
@@ -44,7 +44,7 @@ class Bank:
 
     beyond: Array  # (k,), what is left over what another form leaves
     exact: NDArray[np.bool_]  # (k,), whether all was said rightly
-    errors: Array  # (l,), of numbers, over what their intervals would allow with a `REACH` of one
+    errors: Array  # (l,), of numbers, over what intervals of an `INTERVAL_WIDTH` of one allow
     named: Array  # (m, 3), features of each name that was given; see `certainty.features`
     right: NDArray[np.bool_]  # (m,), whether it is right
     case: NDArray[np.int64]  # (m,), number of its case
@@ -129,7 +129,7 @@ def sensitivity(bank: Bank, criteria: Criteria) -> str:
         shares = [f'{np.mean(each <= limit):.0%}' if len(each) else '-' for each in (right, wrong)]
         return f'{limit:.3g}: {shares[0]}, {shares[1]}'
 
-    def reach(factor: float) -> str:
+    def hold(factor: float) -> str:
         return f'{factor:.3g}: {np.mean(bank.errors <= factor):.0%}'
 
     of_three = (0.5, 1.0, 2.0)
@@ -138,7 +138,11 @@ def sensitivity(bank: Bank, criteria: Criteria) -> str:
         'right, and wrong explanations called adequate',
         [adequate(k * criteria.BEYOND_FORM) for k in of_three],
     )
-    line('REACH', 'intervals that hold', [reach(k * criteria.REACH) for k in of_three])
+    line(
+        'INTERVAL_WIDTH',
+        'intervals that hold',
+        [hold(k * criteria.INTERVAL_WIDTH) for k in of_three],
+    )
     return '\n'.join(lines)
 
 
@@ -153,7 +157,7 @@ def source(criteria: Criteria, made_by: str) -> str:
 BEYOND_FORM = {criteria.BEYOND_FORM:.3g}
 """What is left over what the worst rig of another form leaves, of the worst channel: one, or what
 {ADEQUATE:.0%} of right explanations stay below."""
-REACH = {criteria.REACH:.3g}
+INTERVAL_WIDTH = {criteria.INTERVAL_WIDTH:.3g}
 """Factor on intervals that makes them hold {HOLDS:.0%} of the true numbers."""
 CERTAINTY = ({', '.join(f'{weight:.3g}' for weight in criteria.CERTAINTY)})
 """Weights of the features of a name in the logarithm of the odds that it is right."""

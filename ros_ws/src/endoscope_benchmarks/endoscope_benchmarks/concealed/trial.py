@@ -26,7 +26,7 @@ from endoscope_benchmarks.concealed.strength import left
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_explain.criteria import REACH
+from endoscope_explain.criteria import INTERVAL_WIDTH
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Estimate, Explanation, NamedEffect
 
@@ -76,7 +76,8 @@ class Row(Judgement):
     seconds: float = math.nan  # that explaining took
     # What is left over what rigs of another form leave, of the worst joint.
     beyond_form: float = math.nan
-    # Error of each number over what its interval would allow on that side with a `REACH` of one.
+    # Error of each number over what its interval would allow on that side with an `INTERVAL_WIDTH`
+    # of one.
     errors: tuple[float, ...] = ()
     # Evidence of each named effect, with how many rivals it has, and whether it is right.
     evidence: tuple[dict[str, float], ...] = ()
@@ -147,7 +148,7 @@ def row_of(case: Case) -> Row:
         augmented=augmented,
         seconds=seconds,
         beyond_form=said.beyond_form,
-        errors=tuple(REACH * error for error in errors),
+        errors=tuple(INTERVAL_WIDTH * error for error in errors),
         evidence=tuple(_evidence(effect, case) for effect in said.effects),
         told=tuple(map(_named, told)),
         first_of_told=judged(told, names, case.also | others).first,

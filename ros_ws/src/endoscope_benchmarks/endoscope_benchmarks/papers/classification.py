@@ -24,7 +24,7 @@ from endoscope_benchmarks.trials.unseen_tubes import (
 from endoscope_core.classifier.classification import Classifier, UnseenTensionError
 from endoscope_core.classifier.cnn_classifier import course
 from endoscope_core.classifier.weights_file import load_classifier
-from endoscope_core.control import PhysicalParameters, reach
+from endoscope_core.control import PhysicalParameters, bending_range
 from endoscope_core.dataset import (
     CLASSES_DEG,
     CalibrationDataset,
@@ -276,7 +276,7 @@ def reach_rows(settings: PapersBench) -> list[Row]:
             recording.desired_angle, recording.tension, shipped_rig().joints.gear
         )
         for joint, told in zip(plant.joints.values(), found, strict=True):
-            true, guess = reach(joint), reach(told.joint)
+            true, guess = bending_range(joint), bending_range(told.joint)
             errors.append(100.0 * abs((guess.high - guess.low) / (true.high - true.low) - 1.0))
         settings.report(f'reach: tube {number + 1} of {_TUBES}')
     return [

@@ -16,7 +16,7 @@ from endoscope_core.control import (
     FeedforwardLaw,
     RecursiveHysteresisController,
     TrackerMeasurement,
-    reach,
+    bending_range,
 )
 from endoscope_core.control.limits import shipped_limits
 from endoscope_core.dataset import configuration_of_size, random_instrument, record_calibration
@@ -139,7 +139,7 @@ def calibrate(tube: NeverSeenTube, classifier: Classifier) -> CalibrationFinding
 def within_reach(signal: Signal, plant: PlantDescription) -> Signal:
     """A signal, scaled to 80 % of what every joint of a plant reaches where that is less."""
     angle, _ = signal(np.arange(0.0, signal.duration, 0.01))
-    ends = [(-reached.low, reached.high) for reached in map(reach, plant.joints.values())]
+    ends = [(-reached.low, reached.high) for reached in map(bending_range, plant.joints.values())]
     return signal.scaled(min(1.0, SHARE_OF_REACH * np.min(ends) / float(np.max(np.abs(angle)))))
 
 

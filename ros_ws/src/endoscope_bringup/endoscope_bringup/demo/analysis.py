@@ -131,7 +131,7 @@ def start_of_motion(time: Array, desired: Array, signal: Signal) -> float:
     least, most = desired[late].min(), desired[late].max()
 
     def misfit(start: float) -> float:
-        # What was asked for is the signal, cut where the reach of the tube ends.
+        # What was asked for is the signal, cut where the bending range of the tube ends.
         asked = np.clip(signal(time[late] - start)[0], least, most)
         return float(np.sum((asked - desired[late]) ** 2))
 

@@ -9,11 +9,11 @@ from endoscope_core.control.desired_motion import DesiredMotion
 from endoscope_core.control.feedforward import Feedforward, FeedforwardLaw, FeedforwardSettings
 from endoscope_core.control.handle import Handle, HandleRefusal, HandleSettings
 from endoscope_core.control.internal_model import (
+    BendingRange,
     PhysicalParameters,
-    Reach,
+    bending_range,
     keep_within,
-    reach,
-    reach_in_words,
+    ranges_in_words,
 )
 from endoscope_core.control.limits import MotorLimits, shipped_limits
 from endoscope_core.control.physical_inverse import AdaptivePhysicalInverse, PhysicalInverse
@@ -31,6 +31,7 @@ __all__ = [
     'AdaptiveBacklashController',
     'AdaptiveBacklashSettings',
     'AdaptivePhysicalInverse',
+    'BendingRange',
     'DesiredMotion',
     'Feedforward',
     'FeedforwardLaw',
@@ -43,13 +44,12 @@ __all__ = [
     'PhysicalParameters',
     'PlantLearning',
     'PlantLearningSettings',
-    'Reach',
     'RecursiveHysteresisController',
     'RecursiveHysteresisSettings',
     'TrackerFeedback',
     'TrackerMeasurement',
+    'bending_range',
     'keep_within',
-    'reach',
-    'reach_in_words',
+    'ranges_in_words',
     'shipped_limits',
 ]

@@ -145,10 +145,10 @@ class Handle:
         at_ns = min(received_ns, max(expected_ns, received_ns - self._jitter_ns))
         at_ns = max(at_ns, before_ns + 1)
         apart_ns = at_ns - before_ns
-        reach = self.settings.top_speed * max(apart_ns, self._interval_ns) * _NS
-        reach += 2.0 * self.settings.resolution
+        farthest = self.settings.top_speed * max(apart_ns, self._interval_ns) * _NS
+        farthest += 2.0 * self.settings.resolution
         for angle, last in zip(position, self._raw, strict=True):
-            if abs(angle - last) > reach:
+            if abs(angle - last) > farthest:
                 return self.refuse(HandleRefusal.JUMP, f'{abs(angle - last):.4g} rad')
         self._intervals.append(apart_ns)
         self._interval_ns = median_low(self._intervals)

@@ -318,42 +318,42 @@ class InternalModel:
 
 
 @dataclass(frozen=True)
-class Reach:
+class BendingRange:
     """Smallest and largest bending angle, rad."""
 
     low: float
     high: float
 
     def keep(self, angle: float, velocity: float) -> tuple[float, float]:
-        """A desired angle within reach, and its velocity: zero where the angle is cut."""
+        """A desired angle within the range, and its velocity: zero where the angle is cut."""
         within = min(self.high, max(self.low, angle))
         return within, velocity if within == angle else 0.0
 
 
-def reach_in_words(reaches: Sequence[Reach], joints: Sequence[str]) -> str:
+def ranges_in_words(ranges: Sequence[BendingRange], joints: Sequence[str]) -> str:
     """How far the joints of these names can be bent, in degrees, as a sentence without its stop."""
-    ranges = ', '.join(
+    said = ', '.join(
         f'{joint} from {math.degrees(r.low):.0f} to {math.degrees(r.high):.0f} deg'
-        for joint, r in zip(joints, reaches, strict=True)
+        for joint, r in zip(joints, ranges, strict=True)
     )
-    return f'this tube can be bent: {ranges}'
+    return f'this tube can be bent: {said}'
 
 
 def keep_within(
-    reaches: Sequence[Reach], angle: Sequence[float], velocity: Sequence[float]
+    ranges: Sequence[BendingRange], angle: Sequence[float], velocity: Sequence[float]
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Desired angles (rad) and velocities (rad/s) of J joints, cut where a tube's reach ends.
+    """Desired angles (rad) and velocities (rad/s) of J joints, cut where a tube's range ends.
 
-    Nothing is cut where no reach is known; where no velocities are given, none are returned.
+    Nothing is cut where no range is known; where no velocities are given, none are returned.
     """
-    if not reaches:
+    if not ranges:
         return tuple(angle), tuple(velocity)
     speeds = velocity or (0.0,) * len(angle)
-    kept = [r.keep(a, v) for r, a, v in zip(reaches, angle, speeds, strict=True)]
+    kept = [r.keep(a, v) for r, a, v in zip(ranges, angle, speeds, strict=True)]
     return tuple(a for a, _ in kept), tuple(v for _, v in kept) if velocity else ()
 
 
-def reach(joint: JointParameters, limits: MotorLimits | None = None) -> Reach:
+def bending_range(joint: JointParameters, limits: MotorLimits | None = None) -> BendingRange:
     """Find how far a joint can be bent to and fro, in rad, time and again.
 
     The motor swings slowly as far as its travel and the wires' tension allow, by default those of
@@ -365,4 +365,4 @@ def reach(joint: JointParameters, limits: MotorLimits | None = None) -> Reach:
     model.go_through(there_and_back)
     low = model.angle
     model.go_through([*there_and_back, _BEYOND])
-    return Reach(low, model.angle)
+    return BendingRange(low, model.angle)

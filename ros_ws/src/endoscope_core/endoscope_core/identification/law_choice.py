@@ -14,7 +14,7 @@ from endoscope_core.choices import (
     PHYSICAL,
     SELECTIONS,
 )
-from endoscope_core.control import FeedforwardLaw, PhysicalParameters, Reach
+from endoscope_core.control import BendingRange, FeedforwardLaw, PhysicalParameters
 from endoscope_core.errors import FileError, InputError
 from endoscope_core.identification.class_parameters import (
     load_class_parameters,
@@ -31,7 +31,7 @@ class CalibrationFindings:
     size: float | None = None  # backlash size in rad
     plants: tuple[PhysicalParameters, ...] = ()  # of each joint; empty where not identified
     # How far each joint can be bent in this tube; empty where that is not known.
-    reaches: tuple[Reach, ...] = ()
+    ranges: tuple[BendingRange, ...] = ()
 
 
 class LawChoice:

@@ -24,8 +24,8 @@ class JointFacts:
     """What is the same for every joint of the bending section; SI units."""
 
     gear: Annotated[float, within(0.01, 100.0)]  # shaft angle for one radian at the joint
-    # Largest desired bending in rad, either way, whoever desires it: console, handle, program or
-    # calibration, which is refused where its motion needs more.
+    # Largest desired bending in rad, either way, whoever desires it: played motion, handle, program
+    # or calibration, which is refused where its motion needs more.
     reach: Annotated[float, within(0.1, 3.1)]
     # Largest joint-equivalent motor angle in rad, either way; what compensation adds to the
     # desired bending has its place between the two.

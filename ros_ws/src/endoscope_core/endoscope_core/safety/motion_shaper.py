@@ -136,12 +136,12 @@ class MotionShaper:
         before: float,
         position: float,
         velocity: float,
-        reach: tuple[float, float],
+        ends: tuple[float, float],
         dt: float,
     ) -> tuple[float, float]:
         """Position and velocity of one joint after the period."""
         limits = self.limits
-        low, high = reach
+        low, high = ends
         change = limits.acceleration * dt
         rounding = _ROUNDING / dt
         left = before - position

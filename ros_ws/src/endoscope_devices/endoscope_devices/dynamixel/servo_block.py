@@ -157,8 +157,8 @@ class BlockJudge:
             return Doubt(Failure.RESTARTED, 'has lost its settings: it has restarted')
         if self._last is not None:
             elapsed = (received_ns - self._last_ns) * 1e-9
-            reach = self._max_speed * elapsed + JITTER
-            if abs(block.position - self._last.position) > reach:
+            farthest = self._max_speed * elapsed + JITTER
+            if abs(block.position - self._last.position) > farthest:
                 moved = abs(block.position - self._last.position)
                 return _incredible(
                     f'cannot have moved by {moved:.3g} rad in {elapsed * 1e3:.1f} ms'

@@ -17,7 +17,7 @@ from endoscope_core.physics.effects import lacking
 from endoscope_core.physics.functions.places import NODES, VALUES
 from endoscope_core.physics.layout import FRICTION_PROFILE, PROFILE_TERMS
 from endoscope_core.workers import parallel_map
-from endoscope_explain.criteria import REACH
+from endoscope_explain.criteria import INTERVAL_WIDTH
 from endoscope_explain.explanation import NINETY_PERCENT, Estimate, NominalEstimate
 from endoscope_explain.fit.evidence import counts, is_noise, mean_squares, weights
 from endoscope_explain.fit.free_parameters import (
@@ -158,7 +158,7 @@ def intervals(fit: Fit) -> Intervals:
     bound = (correlation > TOGETHER) & ~np.logical_and.outer(shown, shown)
     nearest = np.where(bound, correlation, 0.0).argmax(axis=1)
     partners = (free[n].name if bound[k, n] else '' for k, n in enumerate(nearest))
-    reach *= REACH
+    reach *= INTERVAL_WIDTH
 
     def values(coordinates: Array) -> Array:
         return np.array([item.value(c) for item, c in zip(free, coordinates, strict=True)])
@@ -189,7 +189,7 @@ def may_be_absent(fit: Fit, effect: Effect) -> bool:
         return False
     spread = _with_form(covariance(fit), fit)[np.ix_(strengths, strengths)]
     distance = np.array([fit.theta[k] - free[k].coordinate(off[free[k].index]) for k in strengths])
-    squared = float(distance @ np.linalg.solve(spread, distance)) / REACH**2
+    squared = float(distance @ np.linalg.solve(spread, distance)) / INTERVAL_WIDTH**2
     return squared <= chi2.ppf(0.9, len(strengths))
 
 

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 STEP = 5.0e-4
 """Difference step of a coordinate: a motor that stalls leaves a valley of the misfit so bent that
 one of 1 % ends a fit at its wall."""
-REACH = 0.7
+LONGEST_STEP = 0.7
 """Largest step of a coordinate: further away the derivative says little."""
 SLOW = 0.2
 """An approximate derivative is renewed once a step lowers the cost by less than this share."""
@@ -138,8 +138,8 @@ def minimise[R, D](
 
 
 def bounded_step(hessian: Array, gradient: Array, theta: Array, low: Array, high: Array) -> Array:
-    """Newton step within bounds and `REACH`: coordinates that hit one are fixed, one by one."""
-    low, high = np.maximum(low, theta - REACH), np.minimum(high, theta + REACH)
+    """Newton step within bounds and `LONGEST_STEP`; coordinates that hit one are fixed in turn."""
+    low, high = np.maximum(low, theta - LONGEST_STEP), np.minimum(high, theta + LONGEST_STEP)
     free = np.ones(len(theta), dtype=bool)
     step = np.zeros(len(theta))
     for _ in range(len(theta) + 1):

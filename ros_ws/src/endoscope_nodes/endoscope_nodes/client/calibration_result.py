@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 
 from endoscope_core.calibration import words_of
-from endoscope_core.control import PhysicalParameters, Reach, reach
+from endoscope_core.control import BendingRange, PhysicalParameters, bending_range
 from endoscope_core.control.internal_model import PROFILE
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_nodes.names import JOINTS, WIRES
@@ -60,7 +60,7 @@ def successful_result(
     if plants:
         values |= plant_values(plants)
         for joint, plant in zip(JOINTS, plants, strict=True):
-            tube = reach(plant.joint)
+            tube = bending_range(plant.joint)
             values |= {f'{REACH}{joint}.low': tube.low, f'{REACH}{joint}.high': tube.high}
     message = f'class {verdict.class_deg} deg with probability {verdict.probability:.3f}'
     return _message(stamp_ns, OK, with_zeros(message, zeros), values)
@@ -139,7 +139,7 @@ def findings_of(message: DiagnosticArray) -> CalibrationFindings | None:
                 int(values['class_deg']),
                 None if size is None else float(size),
                 _plants_of(values),
-                _reaches_of(values),
+                _ranges_of(values),
             )
         except (KeyError, ValueError):
             return None
@@ -166,11 +166,11 @@ def _plants_of(values: Mapping[str, str]) -> tuple[PhysicalParameters, ...]:
     return tuple(plants)
 
 
-def _reaches_of(values: Mapping[str, str]) -> tuple[Reach, ...]:
+def _ranges_of(values: Mapping[str, str]) -> tuple[BendingRange, ...]:
     if not any(key.startswith(REACH) for key in values):
         return ()
     return tuple(
-        Reach(*(float(values[f'{REACH}{joint}.{end}']) for end in ('low', 'high')))
+        BendingRange(*(float(values[f'{REACH}{joint}.{end}']) for end in ('low', 'high')))
         for joint in JOINTS
     )
 

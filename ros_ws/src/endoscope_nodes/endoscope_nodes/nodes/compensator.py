@@ -13,7 +13,7 @@ from endoscope_core.control import (
     FeedforwardSettings,
     MotorLimits,
     keep_within,
-    reach_in_words,
+    ranges_in_words,
 )
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.identification.law_choice import CalibrationFindings, LawChoice
@@ -102,7 +102,7 @@ class CompensatorNode(EndoscopeNode):
         self._answer = StandingStill(names.MOTORS, self.rig.motors.resolution)
         self._corrections: tuple[JointSample | None, JointSample | None] = (None, None)
         self._corrected = False
-        self._beyond_reach = self._beyond_before = 0
+        self._beyond_range = self._beyond_before = 0
         self._state_is_news = True
         self._motors = JointPublisher(
             self, names.MOTOR_COMMAND, names.MOTORS, ('position',), COMMAND
@@ -251,7 +251,7 @@ class CompensatorNode(EndoscopeNode):
             self._feedforward.rebase(
                 self._drive_before() - added, sample.position if step.begins else None
             )
-        within = self._within_reach(sample)
+        within = self._within_range(sample)
         angle, velocity = self._desired.follow(*within, step.seconds)
         if self._news and not any(velocity):
             self._take_news()
@@ -259,13 +259,13 @@ class CompensatorNode(EndoscopeNode):
         drive = self._feedforward.step(angle, velocity, step.seconds) + added
         self._put_out(sample.stamp_ns, drive, step.seconds)
 
-    def _within_reach(self, sample: JointSample) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    def _within_range(self, sample: JointSample) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Desired angles and velocities, cut where the tube at hand lets the tip bend no more."""
         if self.findings is None:
             return sample.position, sample.velocity
-        angle, velocity = keep_within(self.findings.reaches, sample.position, sample.velocity)
+        angle, velocity = keep_within(self.findings.ranges, sample.position, sample.velocity)
         if angle != sample.position:
-            self._beyond_reach += 1
+            self._beyond_range += 1
         return angle, velocity
 
     def _on_calibration(self, sample: JointSample) -> None:
@@ -363,16 +363,16 @@ class CompensatorNode(EndoscopeNode):
         waiting = self._settings.mode != 'none' and self.findings is None
         level = ERROR if self._trouble else WARN if waiting else OK
         said = self._model_in_words()
-        beyond = self._beyond_reach - self._beyond_before
-        self._beyond_before = self._beyond_reach
+        beyond = self._beyond_range - self._beyond_before
+        self._beyond_before = self._beyond_range
         if beyond and self.findings is not None:
             level = max(level, WARN)
-            said += f'; {reach_in_words(self.findings.reaches, names.JOINTS)}, more was asked for'
+            said += f'; {ranges_in_words(self.findings.ranges, names.JOINTS)}, more was asked for'
         return (
             level,
             said,
             {
-                'cut to the reach': self._beyond_reach,
+                'cut to the reach': self._beyond_range,
                 'source': self._source,
                 'published': self._motors.count,
                 'corrected': self._corrected,

@@ -10,12 +10,12 @@ from sensor_msgs.msg import Joy
 
 from endoscope_core.choices import FOLLOW_THE_HANDLE
 from endoscope_core.control import (
+    BendingRange,
     Handle,
     HandleRefusal,
     HandleSettings,
-    Reach,
     keep_within,
-    reach_in_words,
+    ranges_in_words,
 )
 from endoscope_core.errors import FileError
 from endoscope_core.safety import MotionLimits, MotionShaper
@@ -73,8 +73,8 @@ class MasterNode(EndoscopeNode):
         self._handle_from: tuple[float, ...] = ()
         self._handle_moves = False
         self._told_of_handle = False
-        self._reaches: tuple[Reach, ...] = ()
-        self._beyond_reach = self._beyond_before = 0
+        self._ranges: tuple[BendingRange, ...] = ()
+        self._beyond_range = self._beyond_before = 0
         facts = self.rig.joints
         limits, hand_limits = (
             MotionLimits.either_way(
@@ -193,7 +193,7 @@ class MasterNode(EndoscopeNode):
         )
 
     def _on_result(self, message: DiagnosticArray) -> None:
-        """Keep to what this session's own calibration found out about the tube's reach."""
+        """Keep to what this session's own calibration found out about the tube's range."""
         crowd = self._results.rivals()
         if crowd:
             self._session.leave(crowd)
@@ -201,7 +201,7 @@ class MasterNode(EndoscopeNode):
             return
         found = findings_of(message)
         if found is not None or is_of_no_class(message):
-            self._reaches = () if found is None else found.reaches
+            self._ranges = () if found is None else found.ranges
 
     def _rest(self) -> None:
         """Stop moving: whatever comes next begins at the measured pose."""
@@ -322,8 +322,8 @@ class MasterNode(EndoscopeNode):
         stamp_ns: int,
         periods: int,
     ) -> None:
-        asked, (angle, velocity) = angle, keep_within(self._reaches, angle, velocity)
-        self._beyond_reach += angle != tuple(asked)
+        asked, (angle, velocity) = angle, keep_within(self._ranges, angle, velocity)
+        self._beyond_range += angle != tuple(asked)
         shaped = shaper.shape(angle, periods * TICK_S)
         as_asked = all(abs(a - b) < 1e-9 for a, b in zip(angle, shaped, strict=True))
         self._sent_ns = self.ticker.monotonic_ns()
@@ -353,12 +353,12 @@ class MasterNode(EndoscopeNode):
             self.get_logger().warning(unheeded)
         if unheeded:
             return WARN, unheeded, values
-        beyond = self._beyond_reach - self._beyond_before
-        self._beyond_before = self._beyond_reach
+        beyond = self._beyond_range - self._beyond_before
+        self._beyond_before = self._beyond_range
         if beyond:
             return (
                 WARN,
-                f'{reach_in_words(self._reaches, names.JOINTS)}, more was asked for',
+                f'{ranges_in_words(self._ranges, names.JOINTS)}, more was asked for',
                 values,
             )
         if self._played is not None:
