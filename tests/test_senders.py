@@ -200,15 +200,15 @@ def test_a_result_that_outlives_its_sender_is_not_taken(reader):
         graph.advance(0.5)
         compensator, master = graph.nodes['compensator'], graph.nodes['console']
         assert compensator._calibrated_in == graph.session
-        reaches = {f'reach.{joint}.{end}': x for joint in JOINTS for end, x in LOW_REACH.items()}
+        ranges = {f'reach.{joint}.{end}': x for joint in JOINTS for end, x in LOW_REACH.items()}
         result = DiagnosticArray()
         result.header.frame_id = graph.session
         result.status = [
-            status('calibration: hysteresis class', OK, '', {'class_deg': 100} | reaches)
+            status('calibration: hysteresis class', OK, '', {'class_deg': 100} | ranges)
         ]
         leave_behind(graph, graph.nodes[reader], CALIBRATION_RESULT, result, RESULT)
         graph.advance(0.5)
-        taken = {'compensator': compensator._found, 'console': master._reaches}
+        taken = {'compensator': compensator._found, 'console': master._ranges}
         assert not taken[reader]
         assert graph.state == 'FAULT'
         assert CALIBRATION_RESULT in graph.cause
@@ -328,7 +328,7 @@ def test_a_calibration_node_started_anew_is_believed_after_another_enable():
         graph.advance(0.1)
         assert graph.state == 'ENABLED'
         assert graph.nodes['compensator'].findings is not None
-        assert graph.nodes['console']._reaches
+        assert graph.nodes['console']._ranges
         graph.kill('compensator')
         graph.advance(0.02)
         graph.start('compensator')
