@@ -121,7 +121,7 @@ def test_nobody_speaks_for_the_handle_but_while_somebody_operates(rig):
         rig.set('console', source='master')
 
 
-def test_what_the_console_plays_is_ended_only_on_demand_and_does_not_begin_anew(rig):
+def test_what_the_master_plays_is_ended_only_on_demand_and_does_not_begin_anew(rig):
     rig.set('console', source='motion')
     try:
         with rig.page() as page:

@@ -111,7 +111,7 @@ def test_a_pause_ends_it_and_what_is_resumed_waits_for_the_hand(graph, hand):
     assert commands
 
 
-def test_the_console_leaves_the_clutch_to_the_operator_and_takes_it_back():
+def test_the_master_leaves_the_clutch_to_the_operator_and_takes_it_back():
     with run(overrides={'console': {'hold_to_play': True}}) as graph:
         console = graph.nodes['console']
         clutch = f'{console.get_namespace()}/{MASTER_CLUTCH}'

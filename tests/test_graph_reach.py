@@ -33,7 +33,7 @@ def warnings(graph, name):
     return [told.message for told in graph.diagnostics[name] if told.level == WARN]
 
 
-def test_a_calibration_finds_the_reach_and_the_console_keeps_to_it(tmp_path):
+def test_a_calibration_finds_the_reach_and_the_master_keeps_to_it(tmp_path):
     """In a tube so tight that 60 deg are more than it allows."""
     overrides = tube_of_size(tmp_path, 80, 1080)
     plant = load_plant(overrides['motor_driver']['plant_file'])
@@ -55,7 +55,7 @@ def test_a_calibration_finds_the_reach_and_the_console_keeps_to_it(tmp_path):
         assert 'this tube can be bent: bend_x from ' in warnings(graph, 'console: commands')[-1]
 
 
-def test_the_compensator_cuts_what_a_console_asks_for_beyond_it():
+def test_the_compensator_cuts_what_a_master_asks_for_beyond_it():
     overrides = {'compensator': {'mode': 'none'}, 'controller': {'active': False}}
     with SimulatedGraph(overrides=overrides) as graph:
         gear = graph.nodes['compensator'].rig.joints.gear

@@ -236,7 +236,7 @@ def test_it_says_why_nothing_moves(graph):
         check_left_as_found(graph, typist)
 
 
-def test_a_motion_that_the_console_played_does_not_begin_anew_with_nobody_looking(graph):
+def test_a_motion_that_the_master_played_does_not_begin_anew_with_nobody_looking(graph):
     graph.set('console', source='motion')
     with Typist(graph, '--take') as typist:
         typist.enable()

@@ -218,7 +218,10 @@ class MotorRig(ClosedOnExit):
 
 
 def _start(name: str, parameters: dict[str, Any], domain: int) -> subprocess.Popen:
-    code = f'import sys; from endoscope_nodes import program; sys.exit(program.{name}.start())'
+    code = (
+        'import sys; from endoscope_nodes.program import PROGRAMS; '
+        f'sys.exit(PROGRAMS[{name!r}].start())'
+    )
     arguments = [word for k, v in parameters.items() for word in ('-p', f'{k}:={v}')]
     return subprocess.Popen(
         [sys.executable, '-c', code, '--ros-args', *arguments],
