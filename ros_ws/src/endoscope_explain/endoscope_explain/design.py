@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.effects import KNOWN, describe
+from endoscope_core.physics.packing import without_functions
 from endoscope_core.physics.simulator import TICK, simulate
 from endoscope_core.rig import Rig
 from endoscope_core.signals import Signal, hold, move, sequence
@@ -230,11 +231,8 @@ def rival_plant(
     if rival not in KNOWN or rival in there:
         return None
     others = tuple(e for e in plant.effects if (e.id, e.joint) != (effect.id, effect.joint))
-    families = effect.definition.traits.families
-    functions = tuple(
-        t for t in plant.terms if t.joint != effect.joint or t.place not in (effect.id, *families)
-    )
-    bare = replace(plant, effects=others, terms=functions)
+    places = (effect.id, *effect.definition.traits.families)
+    bare = without_functions(replace(plant, effects=others), effect.joint, places)
     observation = next(o for o in observe(recording, bare) if o.joint == effect.joint)
     behind = background(refit(bare, observation, 0.2, 2))
     terms = tuple(Term(describe(rival), start) for start in starting_points(describe(rival)))

@@ -40,6 +40,16 @@ def test_an_effect_shows_where_the_function_does_by_which_the_plant_has_it(recor
     assert place.intervals
 
 
+def test_an_effect_that_is_a_function_of_two_states_goes_with_its_factor(record):
+    law = TermSpec('bend_x', 'tracker_of_time', '0.05 * sin(1.0 * t)')
+    factor = TermSpec('bend_x', 'tracker_of_angle', '0.3 * q', multiplies=True)
+    plant = dataclasses.replace(PLANT, terms=(law, factor))
+    (place,) = locate_effects(
+        record(plant, duration=15.0), plant, [NamedEffect('tracker_drift', 'bend_x', {})]
+    )
+    assert place.signals == ('slave/measured_js:bend_x',)
+
+
 def test_a_stop_shows_beyond_its_angle(record):
     place = located(record, 'joint_stop', angle_rad=0.15)
     assert place.regime.startswith(('beyond', 'above', 'below'))

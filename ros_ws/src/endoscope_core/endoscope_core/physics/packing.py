@@ -2,6 +2,7 @@
 
 import functools
 import math
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -115,15 +116,30 @@ def pack(plant: PlantDescription) -> tuple[Array, Flags]:
     return parameters, flags
 
 
+def without_functions(
+    plant: PlantDescription, joint: str, places: Collection[str]
+) -> PlantDescription:
+    """A plant without the functions at some places of a joint, and what only multiplied them."""
+    kept = tuple(t for t in plant.terms if t.joint != joint or t.place not in places)
+    alone = _multiplying_nothing(kept)
+    return replace(plant, terms=tuple(t for t in kept if t not in alone))
+
+
+def _multiplying_nothing(terms: tuple[TermSpec, ...]) -> list[TermSpec]:
+    def acts_on(term: TermSpec) -> tuple[str, object]:
+        return term.joint, describe_place(term.place).point
+
+    added = {acts_on(term) for term in terms if not term.multiplies}
+    return [term for term in terms if term.multiplies and acts_on(term) not in added]
+
+
 def _check_products(terms: tuple[TermSpec, ...]) -> None:
     """Refuse what multiplies nothing: its plant would be another one than meant."""
-    added = {(t.joint, describe_place(t.place).point) for t in terms if not t.multiplies}
-    for term in terms:
-        if term.multiplies and (term.joint, describe_place(term.place).point) not in added:
-            raise ValueError(
-                f'unknown_term at {term.place} on joint {term.joint} multiplies nothing: add the '
-                'unknown_term that it multiplies, or leave out multiplies'
-            )
+    for term in _multiplying_nothing(terms):
+        raise ValueError(
+            f'unknown_term at {term.place} on joint {term.joint} multiplies nothing: add the '
+            'unknown_term that it multiplies, or leave out multiplies'
+        )
 
 
 def recording_faults(plant: PlantDescription) -> RecordingFaults:

@@ -10,6 +10,7 @@ from scipy.signal import periodogram, savgol_filter
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.effects import describe
 from endoscope_core.physics.layout import IN_MOTOR
+from endoscope_core.physics.packing import without_functions
 from endoscope_core.physics.simulator import TICK
 from endoscope_explain.audit import Finding
 from endoscope_explain.case import ChainCut, Place, changed_parameters
@@ -108,9 +109,7 @@ def _without(plant: PlantDescription, effect: NamedEffect) -> PlantDescription:
     here = effect.id, effect.joint
     if any((e.id, e.joint) == here for e in plant.effects):
         return replace(plant, effects=tuple(e for e in plant.effects if (e.id, e.joint) != here))
-    families = describe(effect.id).traits.families
-    kept = (t for t in plant.terms if t.joint != effect.joint or t.place not in families)
-    return replace(plant, terms=tuple(kept))
+    return without_functions(plant, effect.joint, describe(effect.id).traits.families)
 
 
 def locate_unknown(recording: Recording, explanation: Explanation) -> list[Place]:
