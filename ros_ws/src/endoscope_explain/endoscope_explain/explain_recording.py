@@ -6,6 +6,7 @@ import numpy as np
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.layout import IN_OTHER_JOINT
+from endoscope_core.workers import parallel_map
 from endoscope_explain.decide.conclusions import (
     NOMINAL_UNITS,
     candidates,
@@ -78,7 +79,7 @@ def explain_recording(
         tried = search([pair], jobs, most_effects, left_out)
         return tried, decide(tried, jobs)
 
-    searches, decisions = _explained_together(references, explained, tell)
+    searches, decisions = _explained_together(references, explained, jobs, tell)
     tell('judging on held-out blocks')
     effects = named(observations, decisions)
     of_joint = {o.joint: d for o, d in zip(observations, decisions, strict=True)}
@@ -130,15 +131,17 @@ def _healthy(
 
 
 def _explained_together(
-    references: list[ReferenceFits], explained: Callable[[ReferenceFits], Explained], tell: Progress
+    references: list[ReferenceFits],
+    explained: Callable[[ReferenceFits], Explained],
+    jobs: int,
+    tell: Progress,
 ) -> tuple[list[JointSearch], list[Decision]]:
     """Explain each joint beside the other as that is explained, until no tracker sees a change."""
     # Where the nominal plant leaves no more than noise, nothing that the other joint does is
     # missing.
-    found = []
-    for pair in references:
-        tell(f'searching what {pair[0].model.observation.joint} lacks')
-        found.append(explained(pair))
+    joints = ' and '.join(refitted.model.observation.joint for refitted, _ in references)
+    tell(f'searching what is missing from {joints}')
+    found = parallel_map(explained, references, jobs)
     observations = [refitted.model.observation for refitted, _ in references]
     # How the other joint moved as each was explained: as in its nominal fit, at first.
     seen = [observation.inputs[0, :, IN_OTHER_JOINT] for observation in observations]
@@ -148,7 +151,9 @@ def _explained_together(
         off = float(np.sqrt(np.mean((angle - seen[index]) ** 2)))
         if (not own.chosen.terms and own.adequate) or off <= _noise_of(observations[1 - index]):
             continue
-        tell(f'searching what {observations[index].joint} lacks beside the other one as explained')
+        tell(
+            f'searching what is missing from {observations[index].joint} beside the other one as found'
+        )
         seen[index] = angle
         found[index] = explained(beside(references[index], of_other.chosen.fit))
     return [tried for tried, _ in found], [decision for _, decision in found]
