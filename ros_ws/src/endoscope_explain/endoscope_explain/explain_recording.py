@@ -151,9 +151,8 @@ def _explained_together(
         off = float(np.sqrt(np.mean((angle - seen[index]) ** 2)))
         if (not own.chosen.terms and own.adequate) or off <= _noise_of(observations[1 - index]):
             continue
-        tell(
-            f'searching what is missing from {observations[index].joint} beside the other one as found'
-        )
+        joint = observations[index].joint
+        tell(f'searching what is missing from {joint} beside the other one as found')
         seen[index] = angle
         found[index] = explained(beside(references[index], of_other.chosen.fit))
     return [tried for tried, _ in found], [decision for _, decision in found]
