@@ -182,14 +182,20 @@ def search(
             Parent(each, tuple((own,) for own in each.fits))
             for each in (best, *map(converged, others))
         ]
+    if parents[0].candidate.is_noise:
+        tell(f'{joint}: only noise is left beside {_names(parents[0].candidate) or "nothing"}')
     return JointSearch(nominal, tuple(levels))
+
+
+def _names(one: Candidate) -> str:
+    return ', '.join(term.id for term in one.terms)
 
 
 def _told(level: Level) -> str:
     """What came of a level, in words."""
     if not level.found:
         return 'no term moves anything'
-    names = ', '.join(term.id for term in level.best.terms) or 'other numbers'
+    names = _names(level.best) or 'other numbers'
     gain = level.gain(level.best)
     if level.is_found:
         return f'{names}, better by {gain:.0f} nats'
