@@ -59,6 +59,7 @@ class Screened:
 
 
 def screen_terms(parent: Parent, jobs: int, left_out: tuple[str, ...]) -> Screened:
+    """What each term moves that the parent's own numbers cannot take away."""
     behind = tuple(background(found) for found in parent.candidate.fits)
     terms = _terms(behind, left_out)
     ways = tuple(directions(b, own, jobs) for b, own in zip(behind, terms, strict=True))
@@ -118,9 +119,9 @@ def _trials(screen: Screened, jobs: int) -> list[tuple[float, Trial]]:
         before = own[n]
         if before is None or seen.cost < before.cost:
             own[n] = seen
-    if len(references) == 1:
-        return [(math.log(seen.cost), (seen,)) for (seen,) in best.values() if seen is not None]
-    without = [cost_before(found) for found, *_ in references]
+    # Of several recordings, one stays without a term that is of no use to it.
+    several = len(references) > 1
+    without = [cost_before(found) if several else math.inf for found, *_ in references]
     trials = []
     for own in best.values():
         used = tuple(

@@ -42,9 +42,8 @@ class Candidate:
     """A fitted joint with some terms, in one recording or in several of the same rig."""
 
     terms: tuple[Term, ...]  # in the order in which they were added
-    fits: tuple[
-        Fit, ...
-    ]  # one of each recording; one of several that has no use for a term lacks it
+    # One of each recording; of several, one that has no use for a term lacks it.
+    fits: tuple[Fit, ...]
     evidence: float  # of all recordings; see `log_evidence`
 
     @property
