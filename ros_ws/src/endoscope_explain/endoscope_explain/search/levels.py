@@ -230,7 +230,6 @@ def _level(
     ranked = tuple(first_of_each(found, lambda c: frozenset(term.variant for term in c.terms)))
     if not ranked:
         return Level(first, (), NO_DETECTABLE_GAIN)
-    ranked = _that_predict(ranked, first)
     if not ranked[0].is_noise:
         ranked = (by_fine_derivatives(ranked[0]), *ranked[1:])
     level = _beside_nothing_missing(Level(first, ranked, NO_DETECTABLE_GAIN), screens[0], jobs)
@@ -250,13 +249,3 @@ def _beside_nothing_missing(level: Level, screen: Screened, jobs: int) -> Level:
     if level.best.adds_nominal:
         return level
     return replace(level, null=rigs.beside(level.gain(level.best), FALSE_ALARMS, jobs))
-
-
-def _that_predict(ranked: tuple[Candidate, ...], first: Candidate) -> tuple[Candidate, ...]:
-    """Candidates, best first, from the first one on that predicts blocks better than its parent."""
-    # A function of time can be anything: what it gains where it was fitted it loses where it was
-    # not.
-    for k, each in enumerate(ranked):
-        if each.evidence > first.evidence and each.unseen_misfit < first.unseen_misfit:
-            return ranked[k:]
-    return ranked

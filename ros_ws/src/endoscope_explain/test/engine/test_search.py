@@ -17,7 +17,6 @@ from endoscope_explain.fit.family import family_at
 from endoscope_explain.fit.model import jacobian, packed_joint, simulate_joint
 from endoscope_explain.fit.nominal import nominal_references
 from endoscope_explain.observe.observation import observe
-from endoscope_explain.search import levels
 from endoscope_explain.search.levels import Level, search
 from endoscope_explain.search.null_rigs import Null
 from endoscope_explain.search.refit import Candidate, candidate
@@ -190,20 +189,6 @@ def test_other_numbers_stand_where_a_term_does_hardly_more():
         near.null,
     )
     assert beside.best.terms == (gravity,)
-
-
-def test_what_loses_on_blocks_not_seen_gives_way_to_what_predicts_them(monkeypatch):
-    found = _level({'function': 500.0, 'gravity': 400.0, 'tracker_delay': 300.0}, [0.0]).found
-    first = _candidate(0.0)
-    predicting = {'gravity', 'tracker_delay'}
-    left = {True: 1.0, False: 3.0}
-    monkeypatch.setattr(
-        Candidate, 'unseen_misfit', property(lambda one: left.get(one.fit in predicting))
-    )
-    named = tuple(replace(each, fits=(each.terms[0].id,)) for each in found)
-    assert [c.fit for c in levels._that_predict(named, first)] == ['gravity', 'tracker_delay']
-    predicting.clear()
-    assert levels._that_predict(named, first) == named
 
 
 def test_a_finer_sheath_alone_is_not_named(one_joint):
