@@ -13,10 +13,10 @@ from node_program import code_of
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState, Joy
 
-from endoscope_benchmarks.private_domain import private_domain
 from endoscope_nodes.client.graph_client import joined_graph
 from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
 from endoscope_nodes.names import JOINTS, MASTER_CLUTCH, MOTOR_COMMAND, MOTORS, SLAVE_COMMAND
+from endoscope_nodes.runtime.private_domain import private_domain
 from endoscope_nodes.runtime.qos import EVENT, profile
 from endoscope_nodes.runtime.streams import JointReader
 from endoscope_nodes.topics import Qos

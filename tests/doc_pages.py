@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from endoscope_benchmarks.private_domain import private_domain
+from endoscope_nodes.runtime.private_domain import private_domain
 
 ROOT = Path(__file__).parents[1]
 WORKSPACE = ROOT / 'ros_ws'

@@ -13,10 +13,10 @@ from std_msgs.msg import Header, String
 
 from endoscope_bags.cdr_encoding import encode_joint_state, encode_poses
 from endoscope_bags.message_types import TF_MESSAGE
-from endoscope_benchmarks.private_domain import private_domain
 from endoscope_core.rig import shipped_rig
 from endoscope_nodes.nodes.instrument_model import JointTransforms, section_of
 from endoscope_nodes.nodes.recorder import RecorderNode
+from endoscope_nodes.runtime.private_domain import private_domain
 from endoscope_nodes.runtime.qos import COMMAND, EVENT, RESULT, SENSOR_OFFERED
 from endoscope_nodes.runtime.recorded_topics import message_class
 from endoscope_nodes.runtime.runtime import Runtime

@@ -12,7 +12,6 @@ from rclpy.context import Context
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from endoscope_benchmarks.private_domain import private_domain
 from endoscope_nodes.names import (
     JOINTS,
     MOTOR_MEASURED,
@@ -30,6 +29,7 @@ from endoscope_nodes.nodes.master import MasterNode
 from endoscope_nodes.nodes.motor_driver import MotorDriverNode
 from endoscope_nodes.nodes.recorder import RecorderNode
 from endoscope_nodes.nodes.supervisor import SupervisorNode
+from endoscope_nodes.runtime.private_domain import private_domain
 from endoscope_nodes.runtime.qos import LOCK_STEP
 from endoscope_nodes.runtime.runtime import Runtime
 from endoscope_nodes.runtime.streams import JointSubscription

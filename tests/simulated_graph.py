@@ -8,7 +8,6 @@ from rclpy.task import Future
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from endoscope_benchmarks.private_domain import private_domain
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
 from endoscope_nodes.names import (
     CALIBRATION_RESULT,
@@ -18,6 +17,7 @@ from endoscope_nodes.names import (
     MASTER_NODE,
 )
 from endoscope_nodes.nodes.simulation_clock import SimulationClockNode
+from endoscope_nodes.runtime.private_domain import private_domain
 from endoscope_nodes.runtime.qos import LOCK_STEP, RESULT
 from endoscope_nodes.runtime.runtime import Runtime
 from endoscope_nodes.runtime.streams import JointSample, JointSubscription

@@ -17,7 +17,6 @@ from sensor_msgs.msg import Joy
 from short_bags import PLANT, write_short_bag
 
 from endoscope_bags import open_bag
-from endoscope_benchmarks.private_domain import private_domain
 from endoscope_console.explanations import EXPERIMENT_FILE, REPORT_FILE
 from endoscope_core.physics import save_plant
 from endoscope_core.signals.command_file import write_command_file
@@ -25,6 +24,7 @@ from endoscope_nodes.client.graph_client import joined_graph
 from endoscope_nodes.client.graph_listener import GraphError
 from endoscope_nodes.client.handle_sender import HandleSender
 from endoscope_nodes.names import CONSOLE_LOG, MASTER_CLUTCH, RECORDER_STOP
+from endoscope_nodes.runtime.private_domain import private_domain
 from endoscope_nodes.runtime.qos import EVENT
 from endoscope_nodes.topics import RECORDED
 

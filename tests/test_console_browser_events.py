@@ -8,7 +8,7 @@ from endoscope_benchmarks.console_trials.events import EVENTS, undergo
 from endoscope_benchmarks.console_trials.hand import Hand
 from endoscope_benchmarks.console_trials.relay import Relay
 from endoscope_benchmarks.console_trials.served_console import SAME_RAD, ServedConsole
-from endoscope_benchmarks.private_domain import private_domain
+from endoscope_nodes.runtime.private_domain import private_domain
 
 SETTLED_S, WATCHED_S = 1.0, 0.5
 

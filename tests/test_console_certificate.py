@@ -13,8 +13,8 @@ from console_rig import Server
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from endoscope_benchmarks.private_domain import private_domain
 from endoscope_bringup.cli import main
+from endoscope_nodes.runtime.private_domain import private_domain
 
 _ADDRESS = '127.0.0.2'
 _PATIENCE_S = 60.0

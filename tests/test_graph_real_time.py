@@ -12,9 +12,9 @@ from rclpy.task import Future
 from sensor_msgs.msg import JointState, Joy
 from std_msgs.msg import Header, String
 
-from endoscope_benchmarks.private_domain import private_domain
 from endoscope_core.rig import Timeouts, load_rig
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
+from endoscope_nodes.runtime.private_domain import private_domain
 from endoscope_nodes.runtime.runtime import Runtime
 
 NAMESPACE = '/endoscope/'

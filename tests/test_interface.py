@@ -5,10 +5,10 @@ from contextlib import ExitStack
 import pytest
 from rclpy.context import Context
 
-from endoscope_benchmarks.private_domain import private_domain
 from endoscope_nodes.graph import CONTROL_NODES, SHOWING_NODES, SLAVE_NODES
 from endoscope_nodes.runtime.node_parameters import OF_NODE, OF_PROCESS
 from endoscope_nodes.runtime.parameters import described
+from endoscope_nodes.runtime.private_domain import private_domain
 from endoscope_nodes.runtime.qos import profile
 from endoscope_nodes.runtime.recorded_topics import message_class
 from endoscope_nodes.runtime.runtime import Runtime

@@ -13,13 +13,13 @@ from rclpy.context import Context
 from rclpy.node import Node
 from simulated_graph import SimulatedGraph
 
-from endoscope_benchmarks.private_domain import private_domain
 from endoscope_bringup.operating.status import status_of
 from endoscope_nodes.client.graph_client import joined_graph
 from endoscope_nodes.client.graph_listener import LOCK_STEP
 from endoscope_nodes.client.graph_parameters import set_parameters
 from endoscope_nodes.graph import compose
 from endoscope_nodes.names import FACTOR
+from endoscope_nodes.runtime.private_domain import private_domain
 from endoscope_nodes.runtime.runtime import Runtime
 
 PATIENCE_S = 240.0

@@ -7,7 +7,7 @@ from std_srvs.srv import Trigger
 
 from endoscope_benchmarks.device_faults.motor_faults import MOTOR_FAULTS, undergo
 from endoscope_benchmarks.device_faults.motor_rig import MotorRig
-from endoscope_benchmarks.private_domain import private_domain
+from endoscope_nodes.runtime.private_domain import private_domain
 
 # The bench tries the others too.
 FAULTS = (

@@ -15,8 +15,8 @@ from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from endoscope_benchmarks.private_domain import private_domain
 from endoscope_nodes.program import PROGRAMS
+from endoscope_nodes.runtime.private_domain import private_domain
 from endoscope_nodes.runtime.qos import EVENT, SENSOR_ASKED
 
 DOMAIN = private_domain()

@@ -9,8 +9,8 @@ import pytest
 from operated_graph import OperatedGraph
 from std_msgs.msg import String
 
-from endoscope_benchmarks.private_domain import private_domain
 from endoscope_bringup.cli import main
+from endoscope_nodes.runtime.private_domain import private_domain
 from endoscope_nodes.runtime.qos import EVENT
 
 

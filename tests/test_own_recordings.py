@@ -7,8 +7,7 @@ import pytest
 
 from endoscope_bags import open_bag
 from endoscope_bags.copying import cut
-from endoscope_benchmarks.own_recordings.live_graph import LiveGraph
-from endoscope_benchmarks.private_domain import private_domain
+from endoscope_bringup.demo.live_graph import LiveGraph
 from endoscope_core.physics import PlantDescription
 from endoscope_core.rig import shipped_rig
 from endoscope_explain.audit import audit_recording
@@ -17,6 +16,7 @@ from endoscope_explain.many_bags import explained_case
 from endoscope_explain.observe.predicted_signals import view
 from endoscope_explain.pipeline import Sources
 from endoscope_explain.recording import SETPOINT, recording_from_bag
+from endoscope_nodes.runtime.private_domain import private_domain
 
 PLANT = PlantDescription()
 

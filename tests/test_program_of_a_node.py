@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 from node_program import code_of
 
-from endoscope_benchmarks.private_domain import private_domain
 from endoscope_core.atomic_output import atomic_directory
 from endoscope_nodes import program
 from endoscope_nodes.program import NODES
 from endoscope_nodes.runtime.node_parameters import OF_NODE, OF_PROCESS
 from endoscope_nodes.runtime.parameters import described
+from endoscope_nodes.runtime.private_domain import private_domain
 
 PATIENCE_S = 120.0
 # The last bytes of a complete file: https://mcap.dev/spec.

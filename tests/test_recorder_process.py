@@ -21,7 +21,7 @@ from endoscope_bags.cdr_encoding import encode_joint_state
 from endoscope_bags.copying import recover
 from endoscope_bags.errors import CorruptBagError
 from endoscope_bags.information import bag_information
-from endoscope_benchmarks.private_domain import private_domain
+from endoscope_nodes.runtime.private_domain import private_domain
 from endoscope_nodes.runtime.qos import EVENT, SENSOR_OFFERED
 
 TOPIC = '/endoscope/motor/measured_js'

@@ -11,9 +11,9 @@ from endoscope_bags import BagWriter, open_bag
 from endoscope_bags.cdr_encoding import encode_joint_state, encode_string
 from endoscope_bags.message_types import JOINT_STATE, STRING
 from endoscope_bags.topic import COMMAND_QOS, LATCHED_QOS
-from endoscope_benchmarks.private_domain import private_domain
 from endoscope_nodes.nodes.replay import ReplayNode
 from endoscope_nodes.runtime.parameters import ParameterError
+from endoscope_nodes.runtime.private_domain import private_domain
 from endoscope_nodes.runtime.qos import EVENT, SENSOR_OFFERED
 from endoscope_nodes.runtime.runtime import Runtime
 

@@ -17,12 +17,12 @@ from sensor_graph import PATIENCE_S, SensorGraph
 
 from endoscope_bags import open_bag
 from endoscope_bags.errors import BagError
-from endoscope_benchmarks.private_domain import private_domain
 from endoscope_emulators.aurora import AuroraEmulator
 from endoscope_emulators.cables.serial_cable import SerialCable
 from endoscope_nodes.nodes.em_tracker import EmTrackerNode
 from endoscope_nodes.nodes.load_cells import LoadCellsNode
 from endoscope_nodes.runtime.parameters import ParameterError
+from endoscope_nodes.runtime.private_domain import private_domain
 from endoscope_nodes.runtime.runtime import Runtime
 
 CELLS = 'load_cells: cells'

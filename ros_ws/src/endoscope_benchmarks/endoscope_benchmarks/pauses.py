@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from sensor_msgs.msg import JointState
 
-from endoscope_benchmarks.own_recordings.live_graph import LiveGraph
+from endoscope_bringup.demo.live_graph import LiveGraph
 from endoscope_core.control.limits import COUNT
-from endoscope_nodes.names import CALIBRATION_COMMAND, CALIBRATION_RUN, SLAVE_COMMAND
+from endoscope_nodes.names import CALIBRATION_COMMAND, CALIBRATION_RUN, MASTER_NODE, SLAVE_COMMAND
 from endoscope_nodes.runtime.qos import COMMAND
 
 ASKED = ('home', 'motion', 'handle', 'calibrate')
@@ -44,9 +44,9 @@ def rested_and_moved(seed: int, longest_s: float) -> Row:
     overrides: dict[str, dict[str, object]] = {'calibration': {'motion': 'brief'}}
     with LiveGraph(None, lock_step=True, overrides=overrides, rate=RATE) as graph:
         graph.client.ask('enable')
-        graph.set('console', source='motion')
+        graph.set(MASTER_NODE, source='motion')
         graph.advance(1.5)
-        graph.set('console', source='none')
+        graph.set(MASTER_NODE, source='none')
         graph.advance(rest_s)
         return Row(seed, rest_s, asked, *_asked(graph, asked))
 
@@ -79,7 +79,7 @@ def _asked(graph: LiveGraph, what: str) -> tuple[str, float]:
     elif what == 'home':
         graph.client.order('home')
     elif what == 'motion':
-        graph.set('console', source='motion')
+        graph.set(MASTER_NODE, source='motion')
     else:
         graph.client.trigger(CALIBRATION_RUN)
     while not look():

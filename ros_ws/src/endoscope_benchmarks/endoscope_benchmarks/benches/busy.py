@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
         long_motion,
         shell_trial,
     )
-    from endoscope_benchmarks.private_domain import private_domain
+    from endoscope_nodes.runtime.private_domain import private_domain
 
     domain = private_domain()
     rows: dict[str, list[str]] = {'shell': [], 'console': []}

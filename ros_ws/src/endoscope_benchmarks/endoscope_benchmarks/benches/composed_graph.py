@@ -14,11 +14,11 @@ from rclpy.context import Context
 from rclpy.task import Future
 from std_msgs.msg import String
 
-from endoscope_benchmarks.private_domain import process_domain
 from endoscope_core.safety import OperatingState
 from endoscope_nodes.graph import ALL_NODES
 from endoscope_nodes.names import CLOCK_NODE, STATE_COMMAND
 from endoscope_nodes.nodes.simulation_clock import SimulationClockNode
+from endoscope_nodes.runtime.private_domain import process_domain
 from endoscope_nodes.runtime.qos import EVENT
 from endoscope_nodes.runtime.runtime import Runtime
 

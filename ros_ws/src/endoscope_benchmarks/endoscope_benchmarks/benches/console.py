@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_benchmarks.console_trials.hand import Hand
     from endoscope_benchmarks.console_trials.relay import Relay
     from endoscope_benchmarks.console_trials.served_console import ServedConsole
-    from endoscope_benchmarks.private_domain import private_domain
+    from endoscope_nodes.runtime.private_domain import private_domain
 
     names = tuple(EVENTS) if args.only == ['all'] else tuple(args.only or _USUAL)
     require_known('event', names, EVENTS)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from endoscope_benchmarks.bench import cpu_seconds
-from endoscope_benchmarks.private_domain import private_domain
 from endoscope_benchmarks.process_faults.node_processes import NODES, NodeProcesses
 from endoscope_benchmarks.process_faults.operator import Operator
 from endoscope_core.safety import OperatingState
+from endoscope_nodes.runtime.private_domain import private_domain
 
 CARRIED = 0.99
 _OBEYING = ('compensator', 'motor_driver')

@@ -17,7 +17,6 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_msgs.msg import String
 
-from endoscope_benchmarks.private_domain import process_domain
 from endoscope_core.exit_status import ClosedOnExit
 from endoscope_devices.dynamixel.control_table import COUNT
 from endoscope_emulators.dynamixel.process import EmulatorProcess
@@ -34,6 +33,7 @@ from endoscope_nodes.nodes.master import MasterNode
 from endoscope_nodes.nodes.motor_driver import MotorDriverNode
 from endoscope_nodes.nodes.recorder import RecorderNode
 from endoscope_nodes.nodes.supervisor import SupervisorNode
+from endoscope_nodes.runtime.private_domain import process_domain
 from endoscope_nodes.runtime.qos import EVENT, RESULT, SENSOR_ASKED, SENSOR_OFFERED
 from endoscope_nodes.runtime.runtime import Runtime
 from endoscope_nodes.runtime.streams import JointPublisher, JointSample, JointSubscription

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_benchmarks.own_recordings.live_graph import LiveGraph
+from endoscope_bringup.demo.live_graph import LiveGraph
 from endoscope_core.physics import JointParameters
 from endoscope_core.physics.family import shipped_family
-from endoscope_nodes.names import JOINTS
+from endoscope_nodes.names import JOINTS, MASTER_NODE
 
 Generator = np.random.Generator
 Action = Callable[[LiveGraph, Generator], None]
@@ -69,9 +69,9 @@ def act(graph: LiveGraph, case: Case) -> None:
 def _console(graph: LiveGraph, rng: Generator) -> None:
     motion = str(rng.choice(['periodic', 'non_periodic', 'calibration']))
     joints = [list(JOINTS), list(JOINTS), [JOINTS[0]], [JOINTS[1]]][int(rng.integers(4))]
-    graph.set('console', source='motion', motion=motion, joints=joints)
+    graph.set(MASTER_NODE, source='motion', motion=motion, joints=joints)
     graph.advance(float(rng.uniform(3.0, 8.0)))
-    graph.set('console', source='none')
+    graph.set(MASTER_NODE, source='none')
 
 
 def _teleop(graph: LiveGraph, rng: Generator) -> None:
@@ -125,11 +125,11 @@ def _home(graph: LiveGraph, rng: Generator) -> None:
 
 def _fault(graph: LiveGraph, rng: Generator) -> None:
     """Load cells that fall silent while the slave moves."""
-    graph.set('console', source='motion', motion='periodic', joints=list(JOINTS))
+    graph.set(MASTER_NODE, source='motion', motion='periodic', joints=list(JOINTS))
     graph.advance(float(rng.uniform(1.0, 3.0)))
     graph.set('load_cells', connected=False)
     graph.client.wait_for(lambda: graph.client.state == 'FAULT', 'FAULT')
-    graph.set('console', source='none')
+    graph.set(MASTER_NODE, source='none')
     graph.set('load_cells', connected=True)
     _rest(graph, rng)
     graph.client.ask('disable')

@@ -9,7 +9,7 @@ from pathlib import Path
 from endoscope_bags import open_bag
 from endoscope_bags.copying import cut
 from endoscope_benchmarks.own_recordings.drawing import LEAST_S, act, drawn
-from endoscope_benchmarks.own_recordings.live_graph import LiveGraph
+from endoscope_bringup.demo.live_graph import LiveGraph
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_explain.explanation import Verdict

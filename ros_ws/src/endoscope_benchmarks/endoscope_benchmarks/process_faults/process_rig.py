@@ -4,11 +4,11 @@ import time
 from pathlib import Path
 from random import Random
 
-from endoscope_benchmarks.private_domain import private_domain
 from endoscope_benchmarks.process_faults.node_processes import GRAPH, NODES, NodeProcesses
 from endoscope_benchmarks.process_faults.operator import Operator
 from endoscope_core.exit_status import ClosedOnExit
 from endoscope_core.rig import load_rig
+from endoscope_nodes.runtime.private_domain import private_domain
 
 PATIENCE_S = 60.0
 _MOVED_RAD = 0.02

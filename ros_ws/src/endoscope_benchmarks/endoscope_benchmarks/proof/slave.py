@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_bags import JointStateSeries, open_bag
-from endoscope_benchmarks.own_recordings.live_graph import LiveGraph
+from endoscope_bringup.demo.live_graph import LiveGraph
 from endoscope_core.control.iterated_inverse import iterated_inverse
 from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.physics.simulator import TICK
 from endoscope_core.signals.command_file import write_command_file
 from endoscope_core.signals.motions import motion_by_name
-from endoscope_nodes.names import JOINTS, SLAVE_COMMAND, SLAVE_MEASURED
+from endoscope_nodes.names import JOINTS, MASTER_NODE, SLAVE_COMMAND, SLAVE_MEASURED
 
 Array = NDArray[np.float64]
 
@@ -48,7 +48,7 @@ def record(plant: PlantDescription, motion: str, bag: Path, seed: int) -> None:
     """Record a motion of the master, played on the slave that a plant describes."""
 
     def play(graph: LiveGraph) -> None:
-        graph.set('console', source='motion', motion=motion, joints=list(JOINTS))
+        graph.set(MASTER_NODE, source='motion', motion=motion, joints=list(JOINTS))
         graph.advance(motion_by_name(motion).duration + REST_S)
 
     _played(plant, bag, seed, play)
@@ -69,7 +69,7 @@ def tracked(slave: PlantDescription, known: PlantDescription, folder: Path, seed
         # What is asked for is a command, which nothing else may correct.
         graph.set('compensator', mode='none')
         graph.set('controller', active=False)
-        graph.set('console', command_file=str(file), source='file')
+        graph.set(MASTER_NODE, command_file=str(file), source='file')
         graph.advance(SLOWER * motion.duration + LATEST_S + REST_S)
 
     _played(slave, folder / 'recording', seed, play)
@@ -109,6 +109,6 @@ def _played(
         with LiveGraph(bag, lock_step=True, overrides=overrides) as graph:
             graph.client.ask('enable')
             play(graph)
-            graph.set('console', source='none')
+            graph.set(MASTER_NODE, source='none')
             graph.advance(REST_S)
             graph.stop()

@@ -1,4 +1,4 @@
-"""The whole graph in this process, an operator at its topics, and a hand at its handle."""
+"""The whole graph in this process on a simulated slave, an operator at its topics, and a hand."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -8,33 +8,52 @@ from typing import Any
 from rclpy.context import Context
 from rclpy.task import Future
 
-from endoscope_benchmarks.private_domain import process_domain
-from endoscope_core.errors import EndoscopeError
 from endoscope_core.exit_status import ClosedOnExit
 from endoscope_core.rig import Rig
 from endoscope_nodes.client.graph_client import GraphClient
+from endoscope_nodes.client.graph_listener import GraphError
 from endoscope_nodes.client.graph_parameters import set_parameters
 from endoscope_nodes.client.handle_sender import HandleSender
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
-from endoscope_nodes.names import CLOCK_NODE, MOTOR_MEASURED
+from endoscope_nodes.names import CLOCK_NODE, MASTER_NODE, MOTOR_MEASURED
 from endoscope_nodes.nodes.recorder import RecorderNode
 from endoscope_nodes.nodes.simulation_clock import SimulationClockNode
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.node_context import NodeContext
+from endoscope_nodes.runtime.private_domain import process_domain
 from endoscope_nodes.runtime.runtime import FOREVER_S, Runtime
 
 PATIENCE_S = 60.0
 POLL_S = 0.05
 RATE = {True: 500, False: 1000}
-"""Beats a second in lock-step and in real time."""
+"""Ticks a second in lock-step and in real time."""
+NODES = (*SLAVE_NODES, *CONTROL_NODES)
 
 
 class LiveGraph(ClosedOnExit):
     """All nodes, recorder included, in this process.
 
     The recording lasts from the beginning to :meth:`stop`; there is none without a bag. In
-    lock-step simulated time goes on as the nodes follow, else the wall clock gives it. The rate is
-    in beats a second. By default domain is this process's own, rate that of `RATE`, rig the shipped
-    one.
+    lock-step simulated time goes on as the nodes follow, else the wall clock gives it.
+
+    Parameters
+    ----------
+    bag : Path or None
+        Folder to be made for the recording.
+    domain : int, optional
+        ROS domain; by default this process's own.
+    lock_step : bool
+        Whether time is simulated.
+    overrides : dict
+        Parameters by node.
+    rate : int, optional
+        Ticks a second, by default `RATE`.
+    rig : Rig, optional
+        By default the shipped one.
+    nodes : sequence, optional
+        What makes each node, by default `NODES`.
+    log_level : str, optional
+        Least severe level that nodes print, by default fatal.
     """
 
     def __init__(
@@ -46,20 +65,23 @@ class LiveGraph(ClosedOnExit):
         overrides: dict[str, dict[str, object]],
         rate: int = 0,
         rig: Rig | None = None,
+        nodes: Sequence[Callable[[NodeContext], EndoscopeNode]] = NODES,
+        log_level: str = 'fatal',
     ) -> None:
-        given = dict(overrides)
+        # Load cells may fall silent.
+        given: dict[str, dict[str, object]] = {
+            CLOCK_NODE: {'timeout': PATIENCE_S, 'wait_for': [MOTOR_MEASURED]},
+            **overrides,
+        }
         if bag is not None:
             given['recorder'] = {'bag': str(bag)}
-        if lock_step:
-            # Load cells may fall silent.
-            given[CLOCK_NODE] = {'timeout': PATIENCE_S, 'wait_for': [MOTOR_MEASURED]}
-        arguments = ['--ros-args', '--log-level', 'fatal']
+        arguments = ['--ros-args', '--log-level', log_level]
         arguments += ['-p', f'use_sim_time:={str(lock_step).lower()}']
         arguments += ['-p', f'tick_rate:={rate or RATE[lock_step]}']
         domain = process_domain() if domain is None else domain
         self._runtime = Runtime(arguments, Context(), domain, given, rig=rig)
         try:
-            for factory in (*SLAVE_NODES, *CONTROL_NODES):
+            for factory in nodes:
                 self._runtime.add(factory)
             self._recorder = None if bag is None else self._runtime.add(RecorderNode)
             self.node = self._runtime.add(lambda runtime: EndoscopeNode('operator', runtime))
@@ -76,7 +98,7 @@ class LiveGraph(ClosedOnExit):
         limit = time.monotonic() + PATIENCE_S
         while not (self.client.is_connected() and self._runtime.connected()):
             if time.monotonic() > limit:
-                raise EndoscopeError('the nodes do not find each other: is multicast allowed?')
+                raise GraphError('the nodes did not find each other: is multicast allowed?')
             self._runtime.spin_until(Future(), POLL_S)
         self.advance(0.5)
 
@@ -101,7 +123,7 @@ class LiveGraph(ClosedOnExit):
         self, angles: Callable[[float], Sequence[float]], rate: float, seconds: float
     ) -> None:
         """Follow a handle at a rate in Hz: angles (J,) in rad by the s since its clutch closed."""
-        self.set('console', source='master')
+        self.set(MASTER_NODE, source='master')
         hand = HandleSender(self.node)
         try:
             self.advance(0.3)
@@ -116,17 +138,16 @@ class LiveGraph(ClosedOnExit):
             self.advance(0.3)
         finally:
             hand.close()
-        self.set('console', source='none')
+        self.set(MASTER_NODE, source='none')
 
     @property
     def shafts(self) -> tuple[float, ...]:
         """Measured angles of the shafts in rad, shape (J,)."""
         return self._pose.shafts() or ()
 
-    def stop(self) -> None:
-        """End the recording."""
-        if self._recorder is not None:
-            self._recorder.stop()
+    def stop(self) -> dict[str, int]:
+        """End the recording, and return how many messages of which topic it missed."""
+        return {} if self._recorder is None else dict(self._recorder.stop().lost)
 
     def close(self) -> None:
         """End all nodes."""
