@@ -11,8 +11,10 @@ from endoscope_bags.bag_writer import METADATA_RECORD
 from endoscope_bags.chunk_sink import LIBRARY
 from endoscope_bags.message_types import begins_with_header
 from endoscope_bags.recording import Recording
+from endoscope_bags.rig_kind import kind_of_bag
 from endoscope_bags.sequence_gaps import SequenceGaps
 from endoscope_core.errors import printable
+from endoscope_core.rig import RigKind
 
 LOST_PREFIX = 'lost '
 _NUMBER = re.compile('[0-9]{1,18}')
@@ -58,6 +60,7 @@ class BagInformation:
     topics: tuple[TopicInformation, ...]  # by name
     notes: dict[str, str]  # what the recorder wrote about the recording
     damage: tuple[str, ...]  # empty for a sound file
+    rig: RigKind  # simulated, emulated, real or unknown
 
     @property
     def message_count(self) -> int:
@@ -76,6 +79,7 @@ class BagInformation:
             'message_count': self.message_count,
             'lost': self.lost,
             'topics': [vars(topic) for topic in self.topics],
+            'rig': self.rig.as_json(),
         }
 
     def __str__(self) -> str:
@@ -83,6 +87,7 @@ class BagInformation:
         lines = [
             f'{self.path}: {self.message_count} messages over {self.duration_s:.3f} s',
             f'from {begin} UTC, written by {self.library or "an unnamed program"}',
+            f'rig: {self.rig}',
         ]
         lines += [f'{key}: {value}' for key, value in self.notes.items()]
         lines += [f'damage: {what}' for what in self.damage]
@@ -160,6 +165,7 @@ def bag_information(recording: Recording) -> BagInformation:
         topics=topics,
         notes=notes,
         damage=recording.damage,
+        rig=kind_of_bag(recording),
     )
 
 

@@ -1,5 +1,6 @@
 """`endoscope simulate`: same topics, same stamps, the plant's answer."""
 
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -8,9 +9,11 @@ import pytest
 from endoscope_bags import BagWriter, MessageStream, open_bag
 from endoscope_bags.cdr_encoding import encode_joint_states, encode_poses
 from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED
+from endoscope_bags.rig_kind import kind_of_bag
 from endoscope_bringup.cli import main
 from endoscope_core.kinematics import bending_from_orientation, tip_pose
 from endoscope_core.physics import PlantDescription, SensorModel, save_plant, simulate
+from endoscope_core.rig import Kind
 
 TICKS = 1200
 STAMPS = 1_700_000_000_000_000_000 + np.arange(TICKS) * 1_000_000
@@ -65,7 +68,12 @@ def test_the_answer_has_the_topics_and_stamps_of_the_recording(recorded, plant_f
         '/other/slave/measured_js',
         '/other/motor/measured_js',
         '/other/wires/measured_js',
+        '/other/rig/kind',
     }
+    rig = kind_of_bag(answer)
+    assert rig.kind is Kind.SIMULATED
+    # A plant file's text, as it was written, is what the digest is of.
+    assert rig.plant_sha256 == sha256(plant_file.read_bytes()).hexdigest()
     bending = answer.joint_state('slave/measured_js')
     np.testing.assert_array_equal(bending.stamp_ns, STAMPS[::25])
     np.testing.assert_array_equal(bending.log_ns, STAMPS[::25] + 7)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from endoscope_core.errors import EndoscopeError
+from endoscope_core.rig import Kind
 
 _SILENT_NS = 250_000_000
 
@@ -35,6 +36,10 @@ class MotorDevice(Protocol):
     """
 
     names: tuple[str, ...]
+
+    @property
+    def kind(self) -> Kind:
+        """What the servos are, once they have been opened."""
 
     def open(self) -> None:
         """Connect and check the settings; DeviceError where not reachable, or set up wrongly."""

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from endoscope_core.physics import PlantDescription, PlantSample, PlantSimulator, SensorModel
+from endoscope_core.rig import Kind
 from endoscope_devices.device import MotorReading
 
 Numbers = tuple[float, ...]
@@ -10,6 +11,8 @@ Numbers = tuple[float, ...]
 
 class SimulatedSlave:
     """Servos, wires and J joints of a plant, advanced by the motor driver's beat."""
+
+    kind = Kind.SIMULATED
 
     def __init__(self, plant: PlantDescription, names: Sequence[str], seed: int) -> None:
         if len(names) != len(plant.joint_names()):

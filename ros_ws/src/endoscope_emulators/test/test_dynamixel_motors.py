@@ -8,6 +8,7 @@ import tty
 import pytest
 from patient_clients import PATIENCE_S, opened
 
+from endoscope_core.rig import Kind
 from endoscope_devices.device import DeviceError
 from endoscope_devices.dynamixel.control_table import (
     ALERT,
@@ -15,6 +16,7 @@ from endoscope_devices.dynamixel.control_table import (
     CURRENT_UNIT,
     GOAL_CURRENT,
     GOAL_VELOCITY,
+    MODEL_INFORMATION,
     OPERATING_MODE,
     RETURN_DELAY_TIME,
     TORQUE_ENABLE,
@@ -277,3 +279,22 @@ def test_the_alert_bit_is_kept_with_the_value(line, handler):
     reply = handler.read(1, 132, 4)
     assert reply.error == ALERT
     assert reply.data == (2048).to_bytes(4, 'little')
+
+
+def test_emulated_servos_are_not_taken_for_real_ones(motors):
+    assert motors.kind is Kind.EMULATED
+
+
+@pytest.mark.parametrize(('marked', 'kind'), [((), Kind.REAL), ((2,), Kind.EMULATED)])
+def test_only_servos_without_the_mark_of_an_emulator_are_real(marked, kind):
+    unmarked = MODEL_INFORMATION.initial
+    servos = [
+        EmulatedServo(device) if device in marked else EmulatedServo(device, information=unmarked)
+        for device in (1, 2)
+    ]
+    with EmulatedBus(servos) as bus:
+        motors = opened(BusSettings(bus.port), MOUNTS)
+        try:
+            assert motors.kind is kind
+        finally:
+            motors.close()

@@ -6,15 +6,18 @@ Where that bag has tip poses beside bending angles, the answer has them too.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_bags import BagWriter, JointStateSeries, MessageStream, PoseSeries, Recording
-from endoscope_bags.cdr_encoding import encode_joint_states, encode_poses
-from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED
+from endoscope_bags.cdr_encoding import encode_joint_states, encode_poses, encode_string
+from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED, STRING
 from endoscope_bags.recording import rig_of_bag, rig_record
+from endoscope_bags.rig_kind import RIG_KIND
+from endoscope_bags.topic import LATCHED_QOS
 from endoscope_core.errors import InputError
 from endoscope_core.kinematics import tip_pose
 from endoscope_core.physics import PlantDescription, SensorModel
@@ -25,10 +28,10 @@ from endoscope_core.physics.on_stamps import (
     answer_commands,
 )
 from endoscope_core.physics.packing import recording_faults
-from endoscope_core.physics.plant_file import JOINT_NAMES
+from endoscope_core.physics.plant_file import JOINT_NAMES, plant_as_text
 from endoscope_core.physics.sensing import TOPICS
 from endoscope_core.physics.simulator import TICK
-from endoscope_core.rig import Rig
+from endoscope_core.rig import Kind, Rig, RigKind, digest, rig_as_text
 from endoscope_explain.recording import (
     BENDING,
     COMMAND,
@@ -105,6 +108,11 @@ class BagCommands:
     stamp_ns: NDArray[np.int64]  # (N,), not decreasing
     shaft: NDArray[np.float64]  # (N, J), motor shaft angle in rad
 
+    @property
+    def namespace(self) -> str:
+        """Namespace of the topic, with the slash at its end."""
+        return reduce(str.removesuffix, INPUTS, self.topic)
+
 
 def commands_of_bag(recording: Recording, plant: PlantDescription, rig: Rig) -> BagCommands:
     """Shaft commands of a bag, or desired angles times the gear; InputError without either."""
@@ -153,13 +161,14 @@ def write_answer(
 ) -> int:
     """Write the answer of a plant to the commands of a recording; return the number of messages.
 
-    The new bag has the commands as they are, and `motor/measured_js`, `wires/measured_js` and
+    The new bag has the commands as they are, `motor/measured_js`, `wires/measured_js` and
     `slave/measured_js` at the stamps, under the namespace and with the times of receipt of the
-    recording; a topic that the recording lacks comes at its nominal rate. Only joints that are
-    commanded answer. Where the recording has `tracker/measured_cp`, the answer has it too, at the
-    stamps that it shares with `slave/measured_js`. Without a seed there is neither noise nor
-    quantisation. InputError, BagError or FileError if the recording has no usable commands,
-    its rig cannot be read, or `out` exists.
+    recording, and says on `rig/kind` that it was simulated; a topic that the recording lacks comes
+    at its nominal rate. Only joints that are commanded answer. Where the recording has
+    `tracker/measured_cp`, the answer has it too, at the stamps that it shares with
+    `slave/measured_js`. Without a seed there is neither noise nor quantisation. InputError,
+    BagError or FileError if the recording has no usable commands, its rig cannot be read, or `out`
+    exists.
     """
     rig = rig or rig_of_bag(recording)
     commands = commands_of_bag(recording, plant, rig)
@@ -185,6 +194,9 @@ def write_answer(
             bending_ns = times[BENDING].stamp_ns
             poses = recording.poses(POSE_TOPIC)
             streams.append(answer_poses(poses, bending_ns, answer.bending, commands.joints))
+        kind = _kind(plant, rig, commands)
+        writer.add_topic(kind.topic, kind.type, [LATCHED_QOS])
+        streams.append(kind)
         writer.write_streams(streams)
         return writer.message_count
 
@@ -233,10 +245,21 @@ def _times(recording: Recording, commands: BagCommands, suffix: str, rate: float
         series = recording.joint_state(suffix, order='recorded', finite=())
         require_running_stamps(recording.path, series)
         return _Times(series.topic, series.stamp_ns, series.log_ns, series.publish_ns)
-    namespace = reduce(str.removesuffix, INPUTS, commands.topic)
     first, last = int(commands.stamp_ns[0]), int(commands.stamp_ns[-1])
     stamps = np.arange(first, last + 1, round(1e9 / rate), dtype=np.int64)
-    return _Times(namespace + suffix, stamps, stamps, stamps)
+    return _Times(commands.namespace + suffix, stamps, stamps, stamps)
+
+
+def _kind(plant: PlantDescription, rig: Rig, commands: BagCommands) -> MessageStream:
+    """Make what says in the bag that it was simulated, and by what."""
+    kind = RigKind(
+        Kind.SIMULATED,
+        f'endoscope {version("endoscope_explain")}',
+        digest(rig_as_text(rig)),
+        plant_sha256=digest(plant_as_text(plant)),
+    )
+    content = [encode_string(kind.as_text())]
+    return MessageStream(commands.namespace + RIG_KIND, STRING, content, commands.stamp_ns[:1])
 
 
 def _noisy(answer: Answer, sensors: SensorModel) -> Answer:

@@ -13,10 +13,11 @@ from endoscope_bags.information import losses_told
 from endoscope_bags.joint_state_series import JointStateSeries
 from endoscope_bags.recording import Recording as Bag
 from endoscope_bags.recording import open_bag, rig_of_bag
+from endoscope_bags.rig_kind import kind_of_bag
 from endoscope_bags.sequence_gaps import SequenceGaps
 from endoscope_core.choices import WAIVABLE
 from endoscope_core.physics.description import PlantDescription
-from endoscope_core.rig import Rig, shipped_rig
+from endoscope_core.rig import Rig, RigKind, shipped_rig
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -104,6 +105,7 @@ class Recording:
     start: Array | None = None
     start_speed: Array | None = None  # (J,), speed of each motor then, rad/s; they stood where None
     rig: Rig = field(default_factory=shipped_rig)  # gear, limits and time-outs of what was recorded
+    rig_kind: RigKind = field(default_factory=RigKind)  # what the recording says that it is of
 
     def measured(self) -> dict[str, Series]:
         """Return the recorded measured series by their name in this class."""
@@ -334,6 +336,7 @@ def recording_from_bag(
         shaft_effort=motors['effort'],
         notes=tuple(notes),
         rig=rig,
+        rig_kind=kind_of_bag(bag),
     )
 
 

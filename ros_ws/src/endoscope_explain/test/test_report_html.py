@@ -10,6 +10,7 @@ from chromium import LARGEST_PAGE, drawn
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.rig import Kind, RigKind
 from endoscope_explain.audit import AuditReport, Finding, Severity
 from endoscope_explain.case import NextExperiment, Provenance
 from endoscope_explain.explanation import (
@@ -100,6 +101,15 @@ def page(stribeck_case):
     )
     made = Provenance('bags/rig', 'a1' * 32, 'plant.yaml', 'b2' * 32, '1.2', 'endoscope x', 'today')
     return html_page(with_explanation(stribeck_case, candidates=ranked, provenance=made))
+
+
+def test_a_page_says_of_what_kind_of_rig_its_recording_is(page, stribeck_case):
+    assert 'rig unknown' in text_of(page)
+    rig = RigKind(Kind.EMULATED, 'endoscope 9')
+    of_emulators = dataclasses.replace(stribeck_case.recording, rig_kind=rig)
+    made = Provenance('bags/rig', 'a1' * 32, '', '', '1.2', '', 'today')
+    told = html_page(dataclasses.replace(stribeck_case, recording=of_emulators, provenance=made))
+    assert 'rig emulated (endoscope 9)' in text_of(told)
 
 
 def test_a_page_needs_no_other_file(page):

@@ -9,6 +9,7 @@ import pytest
 
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.plant_file import load_plant
+from endoscope_core.rig import Kind
 from endoscope_core.signals.command_file import read_command_file
 from endoscope_explain.audit import AuditReport, Finding, Severity
 from endoscope_explain.case import NextExperiment, combined_effects, combined_verdict
@@ -20,6 +21,7 @@ STAGES = {'actuator', 'transmission', 'joint', 'sensing', 'recording'}
 KEYS = {
     'schema',
     'verdict',
+    'rig',
     'where',
     'effects',
     'parameters',
@@ -34,6 +36,8 @@ def check_report(report):
     assert set(report) == KEYS
     assert report['schema'] == 1
     assert report['verdict'] in set(Verdict)
+    assert set(report['rig']) == {'kind', 'program', 'rig_sha256', 'plant', 'plant_sha256'}
+    assert report['rig']['kind'] in set(Kind)
     for place in report['where']:
         assert set(place) == {'stage', 'joint', 'signals', 'intervals', 'regime', 'band_hz'}
         assert place['stage'] in STAGES

@@ -320,6 +320,17 @@ TOPICS = (
         recorded=False,
     ),
     Topic(
+        names.RIG_KIND,
+        'std_msgs/msg/String',
+        'once and on change, latched',
+        'what the rig is, as YAML: `kind` `simulated`, `emulated` (servos that this project '
+        'emulates) or `real`, `program` and its version, `rig_sha256` of its `rig.yaml`, and of a '
+        'simulated one `plant` and `plant_sha256`; every recording has it',
+        offered=RESULT,
+        asked=RESULT,
+        said_by=('motor_driver',),
+    ),
+    Topic(
         names.ROBOT_DESCRIPTION,
         'std_msgs/msg/String',
         'once, latched',

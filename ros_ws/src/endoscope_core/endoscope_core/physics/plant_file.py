@@ -185,7 +185,12 @@ def save_plant(plant: PlantDescription, path: str | Path) -> None:
     OSError
         If the file cannot be written.
     """
-    write_text(path, yaml.safe_dump(plant_to_mapping(plant), sort_keys=False))
+    write_text(path, plant_as_text(plant))
+
+
+def plant_as_text(plant: PlantDescription) -> str:
+    """All of a plant as YAML, as `save_plant` writes it."""
+    return yaml.safe_dump(plant_to_mapping(plant), sort_keys=False)
 
 
 def nominal_plant_text() -> str:

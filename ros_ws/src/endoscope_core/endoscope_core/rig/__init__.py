@@ -16,6 +16,7 @@ from endoscope_core.rig.facts import (
     rig_from_text,
     shipped_rig,
 )
+from endoscope_core.rig.kind import Kind, RigKind, digest, kind_from_text, kind_of_several
 
 __all__ = [
     'LOAD_CELL_DEVICES',
@@ -25,11 +26,16 @@ __all__ = [
     'HandleFacts',
     'InstrumentFacts',
     'JointFacts',
+    'Kind',
     'MotorFacts',
     'RecordingFacts',
     'Rig',
+    'RigKind',
     'SimulationFacts',
     'Timeouts',
+    'digest',
+    'kind_from_text',
+    'kind_of_several',
     'load_rig',
     'rig_as_text',
     'rig_from_text',

@@ -8,9 +8,13 @@ from endoscope_devices.dynamixel.control_table import (
     CURRENT_BASED_POSITION,
     CURRENT_LIMIT,
     DRIVE_MODE,
+    EMULATED,
+    FIRMWARE_VERSION,
     GOAL_CURRENT,
     GOAL_POSITION,
     HARDWARE_ERROR_STATUS,
+    MODEL_INFORMATION,
+    MODEL_NUMBER,
     MODELS,
     OPERATING_MODE,
     PROFILE_ACCELERATION,
@@ -69,6 +73,13 @@ def bring_up(bus: PacketHandler, device: int, settings: BusSettings) -> ServoMod
     bus.drain(QUIET_S)
     verify(bus, device, settings)
     return MODELS[number]
+
+
+def is_emulated(bus: PacketHandler, device: int) -> bool:
+    """Say whether a servo is one of this project's emulators; BusError where it does not answer."""
+    # Of a length that nothing else has, as in `verify`.
+    area = (MODEL_NUMBER, MODEL_INFORMATION, FIRMWARE_VERSION)
+    return _read_area(bus, device, area)[MODEL_INFORMATION] == EMULATED
 
 
 def verify(

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from endoscope_devices.device import DeviceError, MotorReading
-from endoscope_devices.dynamixel.bring_up import bring_up, enable
+from endoscope_devices.dynamixel.bring_up import bring_up, enable, is_emulated
 from endoscope_devices.dynamixel.control_table import (
     ALERT,
     COUNT,
@@ -67,6 +67,7 @@ class ServoHealth:
     """What is known of a servo beside its motion."""
 
     model: str = ''
+    emulated: bool = False  # whether it says that it is one of this project's emulators
     error: int = 0  # error byte of its last answer
     hardware: str = ''  # errors in words
     voltage: float = 0.0  # V, as last read
@@ -177,6 +178,7 @@ class BusThread:
             if self._reboot_wanted.is_set():
                 self._restart(bus)
             models = [bring_up(bus, device, self.settings) for device in self._ids]
+            emulated = [is_emulated(bus, device) for device in self._ids]
         except (OSError, BusError):
             port.close()
             raise
@@ -188,7 +190,9 @@ class BusThread:
         self._judges = [
             BlockJudge(_SPEED_MARGIN * model.no_load_speed, _LARGEST_CURRENT_A) for model in models
         ]
-        self.health = [ServoHealth(model.name) for model in models]
+        self.health = [
+            ServoHealth(model.name, known) for model, known in zip(models, emulated, strict=True)
+        ]
         self._torque = False
         self._unpublished = [False for _ in self.mounts]
         # The shafts may have been turned since: nothing may be held where they were.

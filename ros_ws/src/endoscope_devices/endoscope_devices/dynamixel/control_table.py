@@ -20,6 +20,8 @@ TICK_PERIOD = 32768
 
 CURRENT_BASED_POSITION = 5
 WATCHDOG_TRIPPED = -1
+# What Model Information(2) of an emulated servo reads, so that nobody takes it for a real one.
+EMULATED = int.from_bytes(b'EMUL', 'little')
 MULTI_TURN_LIMIT = 1_048_575
 
 BAUD_CODES = {

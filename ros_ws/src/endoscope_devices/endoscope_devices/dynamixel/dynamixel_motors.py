@@ -4,6 +4,7 @@ import dataclasses
 import time
 from collections.abc import Sequence
 
+from endoscope_core.rig import Kind
 from endoscope_devices.device import MotorReading
 from endoscope_devices.dynamixel.bus_thread import BusThread, TimedReading
 from endoscope_devices.dynamixel.control_table import error_in_words
@@ -17,6 +18,12 @@ class DynamixelMotors:
         self.names = tuple(mount.name for mount in mounts)
         self.bus = BusThread(settings, mounts)
         self._given: TimedReading | None = None
+
+    @property
+    def kind(self) -> Kind:
+        """Emulated if any of the servos is."""
+        emulated = any(health.emulated for health in self.bus.health)
+        return Kind.EMULATED if emulated else Kind.REAL
 
     def open(self) -> None:
         """Open the port and set the servos up; see :meth:`BusThread.start`."""

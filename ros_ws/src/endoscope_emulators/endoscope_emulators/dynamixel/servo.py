@@ -66,13 +66,17 @@ class ErrorNumber(IntEnum):
 
 
 class EmulatedServo:
-    """A servo that is advanced by the time of its bus; `baud_code` as in Baud Rate(8)."""
+    """A servo that is advanced by the time of its bus; `baud_code` as in Baud Rate(8).
+
+    Its Model Information(2) says that it is emulated.
+    """
 
     def __init__(
         self,
         device: int,
         baud_code: int = 3,
         model: int = 1020,
+        information: int = table.EMULATED,
         shaft: FirstOrderShaft | None = None,
     ) -> None:
         self.shaft = FirstOrderShaft() if shaft is None else shaft
@@ -86,6 +90,7 @@ class EmulatedServo:
             if register.eeprom:
                 self._store(register, register.initial)
         self._store(table.MODEL_NUMBER, model)
+        self._store(table.MODEL_INFORMATION, information)
         self._store(table.ID, device)
         self._store(table.BAUD_RATE, baud_code)
         self._now = self._begin = 0.0

@@ -32,6 +32,7 @@ def report_mapping(case: ExplainedCase) -> dict[str, Any]:
     content = {
         'schema': SCHEMA,
         'verdict': str(case.verdict),
+        'rig': case.recording.rig_kind.as_json(),
         'where': [_place(place) for place in case.places],
         'effects': [_effect(effect) for effect in case.effects],
         'parameters': {

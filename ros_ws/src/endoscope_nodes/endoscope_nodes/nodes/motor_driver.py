@@ -1,9 +1,13 @@
 """Drives the motor shafts: the simulated slave or a bus of servos, the same node for both."""
 
 from collections import deque
+from dataclasses import replace
+from importlib.metadata import version
 
 from std_msgs.msg import String
 
+from endoscope_core.physics.plant_file import plant_as_text
+from endoscope_core.rig import Kind, RigKind, digest, rig_as_text
 from endoscope_core.safety import CommandLimits, MotionLimits, OperatingState, Refusal, ShaftMotion
 from endoscope_devices.device import DeviceError, MotorDevice
 from endoscope_devices.dynamixel.control_table import BAUD_CODES
@@ -33,7 +37,8 @@ class MotorDriverNode(EndoscopeNode):
     shaped goal goes to the device and its reading is published, and the goal where it changes.
     Without fresh commands, and outside of a session, the shafts go to the position measured at that
     moment and hold it; only ``DISABLED`` lets them go.  The simulated slave also publishes the
-    noise-free tensions and angles that the simulated load cells and tracker read.
+    noise-free tensions and angles that the simulated load cells and tracker read.  On ``rig/kind``
+    it says whether what it drives is simulated, emulated or real.
     """
 
     def __init__(self, context: NodeContext) -> None:
@@ -68,6 +73,9 @@ class MotorDriverNode(EndoscopeNode):
         self._setpoint = JointPublisher(
             self, names.MOTOR_SETPOINT, names.MOTORS, ('position',), SENSOR_OFFERED
         )
+        self._rig_kind = self._describe_rig(context)
+        self._kinds = self.create_publisher(String, names.RIG_KIND, RESULT)
+        self._tell_kind()
         self._told: tuple[float, ...] = ()
         self._told_ns = 0
         self._torque = False
@@ -99,11 +107,32 @@ class MotorDriverNode(EndoscopeNode):
         )
         self.diagnostics.add('device', self._report_device, device)
         self.ticker.add(self._on_tick)
+        self.ticker.every(1.0, self._follow_kind)
 
     @property
     def announcement(self) -> str:
         """Name the device."""
         return f'motors {self._device_name}'
+
+    def _describe_rig(self, context: NodeContext) -> RigKind:
+        described = RigKind(
+            self._device.kind,
+            f'endoscope {version("endoscope_nodes")}',
+            digest(rig_as_text(self.rig)),
+        )
+        if described.kind is not Kind.SIMULATED:
+            return described
+        plant = digest(plant_as_text(context.plant))
+        return replace(described, plant=context.plant_name, plant_sha256=plant)
+
+    def _tell_kind(self) -> None:
+        self._kinds.publish(String(data=self._rig_kind.as_text()))
+
+    def _follow_kind(self) -> None:
+        # Other servos may have been plugged in.
+        if self._device.kind is not self._rig_kind.kind:
+            self._rig_kind = replace(self._rig_kind, kind=self._device.kind)
+            self._tell_kind()
 
     def _dynamixel(self, parameters: DynamixelParameters) -> MotorDevice:
         self.require_real_time(self._device_name)
@@ -196,6 +225,7 @@ class MotorDriverNode(EndoscopeNode):
             'times held': self.motion.holds,
             'holding': self.motion.holding,
             'commands bounded': self.motion.shaper.bounded,
+            'rig': self._device.kind,
         }
         if self.latency_ns:
             ordered = sorted(self.latency_ns)

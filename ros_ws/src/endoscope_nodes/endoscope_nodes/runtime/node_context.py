@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 
 from rclpy.context import Context
 from rclpy.node import Node
@@ -196,6 +197,11 @@ class NodeContext:
         if self._plant is None:
             self._plant = load_slave(*self._plant_source)
         return self._plant
+
+    @property
+    def plant_name(self) -> str:
+        """File name of the simulated slave's plant; `nominal` where there is no file."""
+        return Path(self._plant_source[1]).name or 'nominal'
 
     def seed_of(self, device: int) -> int:
         """Seed of the noise of a simulated device; each has its own number."""

@@ -1,0 +1,25 @@
+"""What kind of rig a recording is of, by the latched topic that says it."""
+
+from endoscope_bags.errors import MalformedMessageError
+from endoscope_bags.message_types import STRING
+from endoscope_bags.recording import Recording
+from endoscope_core.rig import RigKind, kind_from_text, kind_of_several
+
+RIG_KIND = 'rig/kind'
+"""Topic, in whatever namespace, of a std_msgs/String."""
+
+
+def kind_of_bag(recording: Recording) -> RigKind:
+    """Return what a recording says of its rig: unknown where it says nothing, or nothing readable.
+
+    Where it says several things, as after a change of servos, it is real only if all of them are.
+    """
+    said = []
+    for name, topic in recording.topics.items():
+        if not f'/{name}'.endswith(f'/{RIG_KIND}') or topic.type != STRING:
+            continue
+        try:
+            said += [kind_from_text(message.data) for _, message in recording.decoded(name)]
+        except MalformedMessageError:
+            said.append(RigKind())
+    return kind_of_several(said)

@@ -1,0 +1,100 @@
+"""No recording can be mistaken for one of a real rig: the graph says what it is, late or early."""
+
+import json
+
+import pytest
+from simulated_graph import SimulatedGraph
+
+from endoscope_bags import BagWriter, open_bag
+from endoscope_bags.cdr_encoding import encode_string
+from endoscope_bags.copying import cut
+from endoscope_bags.message_types import STRING
+from endoscope_bags.recording import rig_of_bag
+from endoscope_bags.rig_kind import kind_of_bag
+from endoscope_benchmarks.device_faults.motor_rig import MotorRig
+from endoscope_benchmarks.private_domain import private_domain
+from endoscope_bringup.cli import main
+from endoscope_core.physics import PlantDescription, save_plant
+from endoscope_core.physics.plant_file import plant_as_text
+from endoscope_core.rig import Kind, RigKind, digest, rig_as_text
+from endoscope_nodes.nodes.recorder import RecorderNode
+
+MS = 10**6
+
+
+@pytest.fixture(scope='module')
+def of_the_simulation(tmp_path_factory):
+    """Two recordings of one graph, the second begun while it ran."""
+    folder = tmp_path_factory.mktemp('simulation')
+    save_plant(PlantDescription(), folder / 'tight.yaml')
+    overrides = {
+        'motor_driver': {'plant_file': str(folder / 'tight.yaml')},
+        'recorder': {'bag': str(folder / 'first')},
+    }
+    with SimulatedGraph(extra=(RecorderNode,), overrides=overrides) as graph:
+        graph.advance(0.5)
+        recorder = graph.nodes['recorder']
+        recorder.stop()
+        graph.advance(0.5)
+        graph.set('recorder', bag=str(folder / 'second'))
+        recorder.start()
+        graph.connect()
+        graph.advance(0.5)
+        recorder.stop()
+    return folder
+
+
+@pytest.mark.parametrize('name', ['first', 'second'])
+def test_a_simulation_says_so_and_by_what(of_the_simulation, name):
+    bag = open_bag(of_the_simulation / name)
+    rig = kind_of_bag(bag)
+    assert rig.kind is Kind.SIMULATED
+    assert rig.program.startswith('endoscope ')
+    assert rig.rig_sha256 == digest(rig_as_text(rig_of_bag(bag)))
+    assert rig.plant == 'tight.yaml'
+    assert rig.plant_sha256 == digest(plant_as_text(PlantDescription()))
+
+
+def test_a_stretch_of_it_says_the_same(of_the_simulation, tmp_path):
+    cut(of_the_simulation / 'first', tmp_path / 'part', 0.3, 0.4)
+    whole = open_bag(of_the_simulation / 'first')
+    assert kind_of_bag(open_bag(tmp_path / 'part')) == kind_of_bag(whole)
+
+
+def test_servos_that_are_emulated_say_so(tmp_path):
+    with MotorRig(tmp_path, domain=private_domain()) as rig:
+        assert rig.wait(lambda: bool(rig.shafts))
+        recorder = rig.node('recorder')
+        assert rig.wait(lambda: recorder._session.report().counts['/endoscope/rig/kind'])
+    emulated = kind_of_bag(open_bag(rig.bag))
+    assert (emulated.kind, emulated.plant) == (Kind.EMULATED, '')
+
+
+def bag_that_says(path, *texts):
+    with BagWriter(path) as writer:
+        writer.write_raw('/rig/other', STRING, encode_string('kind: real'), MS)
+        for text in texts:
+            writer.write_raw('/endoscope/rig/kind', STRING, encode_string(text), 2 * MS)
+    return path
+
+
+def test_a_recording_that_does_not_say_is_unknown(tmp_path, capsys):
+    bag = bag_that_says(tmp_path / 'bag')
+    assert kind_of_bag(open_bag(bag)) == RigKind()
+    assert main(['bag', 'info', str(bag)]) == 0
+    assert 'rig: unknown\n' in capsys.readouterr().out
+
+
+def test_a_message_that_does_not_decode_is_unknown(tmp_path):
+    path = tmp_path / 'bag'
+    with BagWriter(path) as writer:
+        writer.write_raw('/rig/kind', STRING, b'\0\1\0\0\xff\xff', MS)
+    assert kind_of_bag(open_bag(path)) == RigKind()
+
+
+def test_info_tells_it(tmp_path, capsys):
+    bag = bag_that_says(tmp_path / 'bag', 'kind: real', 'kind: emulated\nprogram: endoscope 1')
+    assert main(['bag', 'info', str(bag), '--json']) == 0
+    assert json.loads(capsys.readouterr().out)['rig']['kind'] == 'emulated'
+    assert main(['bag', 'info', str(bag)]) == 0
+    assert 'rig: emulated (endoscope 1)\n' in capsys.readouterr().out
