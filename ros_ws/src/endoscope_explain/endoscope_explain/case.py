@@ -5,9 +5,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
+from endoscope_core.physics.effect import Stage
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.audit import AuditReport
-from endoscope_explain.decide.conclusions import has_changed, verdict_by_stage
+from endoscope_explain.decide.conclusions import has_changed, verdict
 from endoscope_explain.explanation import (
     ChannelFit,
     Explanation,
@@ -32,25 +33,18 @@ def combined_effects(explanation: Explanation, audit: AuditReport) -> tuple[Name
 
 
 def combined_verdict(explanation: Explanation, audit: AuditReport) -> Verdict:
-    """Say in one word what engine and audit found."""
-    # Where the rig hardly moves nothing can be told. Missing physics wins over a faulty sensor,
-    # that over a faulty recording, and any of them over differing parameters: these always differ a
-    # little. What was mistaken in the recording itself is the verdict: the rest is about another
-    # recording than was given.
-    return Verdict.RECORDING_FAULT if audit.mistakes() else verdict_of_rest(explanation, audit)
-
-
-def verdict_of_rest(explanation: Explanation, audit: AuditReport) -> Verdict:
-    """Say in one word what was found once all mistakes are put right."""
-    audit = audit.apart_from_mistakes()
-    if explanation.verdict in (Verdict.INSUFFICIENT_DATA, Verdict.UNKNOWN_PHYSICS):
-        return explanation.verdict
-    if all_refuted(explanation) and not explanation.adequate:
-        return Verdict.UNKNOWN_PHYSICS
-    effects = combined_effects(explanation, audit)
-    if effects or audit.faults():
-        return verdict_by_stage(effects)
-    return explanation.verdict
+    """The verdict of the engine, given the audit and what a second recording refutes."""
+    of_engine = explanation.verdict
+    refuted = all_refuted(explanation) and not explanation.adequate
+    return verdict(
+        # Faults that are no effect of the catalogue are the recording's.
+        [effect.stage for effect in combined_effects(explanation, audit)]
+        + [Stage.RECORDING for _ in audit.faults()],
+        unknown=refuted or of_engine is Verdict.UNKNOWN_PHYSICS,
+        changed=of_engine is Verdict.PARAMETERS_DIFFER,
+        mistaken=bool(audit.mistakes()),
+        too_little=of_engine is Verdict.INSUFFICIENT_DATA,
+    )
 
 
 def all_refuted(explanation: Explanation) -> bool:
@@ -183,5 +177,6 @@ class ExplainedCase:
     @property
     def rest(self) -> Verdict:
         """The verdict with what was mistaken in the recording put right."""
-        mistaken = self.audit.mistakes()
-        return verdict_of_rest(self.explanation, self.audit) if mistaken else self.verdict
+        if not self.audit.mistakes():
+            return self.verdict
+        return combined_verdict(self.explanation, self.audit.apart_from_mistakes())

@@ -11,12 +11,14 @@ from endoscope_explain.decide.conclusions import (
     NOMINAL_UNITS,
     candidates,
     fitting,
+    is_unknown,
     ladder,
     missing_function,
     named,
+    numbers_differ,
     plant_of,
     refitted,
-    verdict_of,
+    verdict,
 )
 from endoscope_explain.decide.decision import Decision, decide
 from endoscope_explain.decide.given_physics import GivenJoints, explained_by
@@ -84,7 +86,11 @@ def explain_recording(
     effects = named(observations, decisions)
     of_joint = {o.joint: d for o, d in zip(observations, decisions, strict=True)}
     return Explanation(
-        verdict=verdict_of(effects, decisions),
+        verdict=verdict(
+            [effect.stage for effect in effects],
+            unknown=is_unknown(decisions),
+            changed=numbers_differ(decisions),
+        ),
         effects=effects,
         parameters={
             joint: nominal_estimates(d.chosen.fit, packed_joint(plant, joint)[0], NOMINAL_UNITS)

@@ -96,11 +96,7 @@ def read_inputs(sources: Sources) -> Inputs:
         if path is None:
             return None
         other = read(path, plant)
-        if other.joints != raw.joints:
-            raise BagError(
-                f'{path}: has {", ".join(other.joints)}, but {sources.bag} has '
-                f'{", ".join(raw.joints)}'
-            )
+        refuse_other_joints(path, other.joints, sources.bag, raw.joints)
         audited = audit_recording(other, plant)
         mistakes = audited.mistakes()
         said.extend(f'the {what} {other.name}: {f.text}; {f.remedy}' for f in mistakes)
@@ -109,6 +105,16 @@ def read_inputs(sources: Sources) -> Inputs:
     baseline = second('baseline', sources.baseline)
     validation = second('second recording', sources.validate)
     return Inputs(sources, audit_recording(raw, plant), baseline, validation, tuple(said))
+
+
+def refuse_other_joints(
+    bag: Path, joints: Collection[str], first: Path, joints_of_first: Collection[str]
+) -> None:
+    """BagError if a bag has not the joints of the first one."""
+    if set(joints) != set(joints_of_first):
+        raise BagError(
+            f'{bag}: has {", ".join(joints)}, but {first} has {", ".join(joints_of_first)}'
+        )
 
 
 def explain_case(

@@ -4,13 +4,12 @@ from collections.abc import Callable, Mapping, Sequence
 
 from threadpoolctl import threadpool_limits
 
-from endoscope_bags.errors import BagError
 from endoscope_core.physics.effects import describe
 from endoscope_explain.decide.given_physics import GivenJoints, GivenPhysics, without_recording
 from endoscope_explain.fit.nominal import ReferenceFits, with_references
 from endoscope_explain.fit.pooled import judged_alone
 from endoscope_explain.observe.observation import observe, with_held_noise
-from endoscope_explain.pipeline import Sources, read_inputs
+from endoscope_explain.pipeline import Sources, read_inputs, refuse_other_joints
 from endoscope_explain.search.levels import search
 
 
@@ -23,6 +22,8 @@ def physics_of_all(
         for one in sources:
             inputs = read_inputs(one)
             recording = inputs.audit.recording
+            if recordings:
+                refuse_other_joints(one.bag, recording.joints, sources[0].bag, recordings[0])
             tell(f'{recording.name}: refitting the nominal plant')
             _, references = with_references(
                 recording,
@@ -31,13 +32,7 @@ def physics_of_all(
                 one.band,
                 jobs,
             )
-            joints = recording.joints
-            if recordings and set(joints) != set(recordings[0]):
-                raise BagError(
-                    f'{one.bag}: has {", ".join(joints)}, but {sources[0].bag} has '
-                    f'{", ".join(recordings[0])}'
-                )
-            recordings.append(dict(zip(joints, references, strict=True)))
+            recordings.append(dict(zip(recording.joints, references, strict=True)))
         return shared_effects(recordings, sources[0].most_effects, jobs, tell)
 
 

@@ -96,3 +96,22 @@ def test_by_how_little_a_servo_overshot_is_part_of_the_past(record):
     for told in audit.findings:
         assert told.remedy == 'the state at the start is estimated, and all is judged from it'
         assert 0.0 < abs(told.evidence['reversal_2_rad']) < 1e-4
+
+
+@pytest.mark.filterwarnings('error::RuntimeWarning')
+def test_a_plant_far_from_the_rig_does_not_send_the_search_beyond_all_numbers(record):
+    factors = {
+        'pretension': 2.2,
+        'wire_stiffness': 0.27,
+        'pulley_radius': 0.14,
+        'joint_radius': 0.35,
+        'capstan_exponent': 3.15,
+        'joint_stiffness': 2.91,
+        'motor_bandwidth': 0.08,
+        'motor_damping_ratio': 0.42,
+    }
+    joint = PLANT.joints['bend_x']
+    wrong = replace(joint, **{name: f * getattr(joint, name) for name, f in factors.items()})
+    plant = replace(PLANT, joints={**PLANT.joints, 'bend_x': wrong})
+    audit = audit_recording(since(moved(record, SWEEP), 3.1), plant)
+    assert 'earlier_motion' in {f.id for f in audit.findings if f.joint == 'bend_x'}

@@ -31,6 +31,8 @@ SHORTEST = 1e-6
 STEPS = 40
 """Of the search that goes on from the best of them, for each number."""
 SEARCH = 'Nelder-Mead'
+EXTREMES = np.array([np.finfo(float).eps, 1.0])
+"""Ways back that the search may come to, over twice the motor's reach."""
 FLIGHT = np.array([1e-3, 0.1])
 """Angle in rad and speed in rad/s by which that search begins to move a motor that is turning."""
 
@@ -221,7 +223,11 @@ class _Past:
 
         def start(numbers: Array) -> _Start:
             moved = np.append(numbers[:own], np.zeros(2 - own))
-            backs = begun.backs * np.exp(numbers[own:])
+            # Beyond twice the reach all ways back are clipped to the same one, and below a
+            # rounding error none is left: there the misfit is flat, and a search that goes on
+            # doubles its step until the exponential overflows or is zero.
+            ends = np.log(2.0 * self._reach * EXTREMES[:, None] / np.abs(begun.backs))
+            backs = begun.backs * np.exp(np.clip(numbers[own:], *ends))
             return replace(begun, motor=begun.motor + moved, backs=backs)
 
         begin = np.zeros(own + len(begun.backs))

@@ -1,7 +1,7 @@
 """What is concluded from the decisions on all joints: names, verdict, plants, ladder of fits."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -105,30 +105,50 @@ def _named(joint: str, decision: Decision, term: MissingTerm, left: float) -> Na
     )
 
 
-def verdict_of(effects: tuple[NamedEffect, ...], decisions: list[Decision]) -> Verdict:
-    """What the named effects, or the parameters alone, amount to."""
-    unknown = any(not term.is_known for d in decisions for term in d.missing)
-    unnamed = any(not d.adequate and d.explained < MOST for d in decisions)
-    if unknown or unnamed:
+def verdict(
+    stages: Iterable[str],
+    *,
+    unknown: bool,
+    changed: bool,
+    mistaken: bool = False,
+    too_little: bool = False,
+) -> Verdict:
+    """The one word for what was found: by stages of effects and faults, and what else is known."""
+    # What was mistaken in the recording itself comes first: the rest is about another recording
+    # than was given. Where the rig hardly moves nothing can be told. Missing physics wins over a
+    # faulty sensor, that over a faulty recording, and any of them over differing parameters: these
+    # always differ a little.
+    found = set(stages)
+    if mistaken:
+        return Verdict.RECORDING_FAULT
+    if too_little:
+        return Verdict.INSUFFICIENT_DATA
+    if unknown:
         return Verdict.UNKNOWN_PHYSICS
-    if effects:
-        return verdict_by_stage(effects)
-    changed = any(
+    if found & {Stage.ACTUATOR, Stage.TRANSMISSION, Stage.JOINT}:
+        return Verdict.MISSING_PHYSICS
+    if Stage.SENSING in found:
+        return Verdict.SENSOR_FAULT
+    if found:
+        return Verdict.RECORDING_FAULT
+    return Verdict.PARAMETERS_DIFFER if changed else Verdict.CONSISTENT
+
+
+def is_unknown(decisions: list[Decision]) -> bool:
+    """Whether something acts that has no name, or whose names leave the main thing unsaid."""
+    unknown = any(not term.is_known for d in decisions for term in d.missing)
+    return unknown or any(not d.adequate and d.explained < MOST for d in decisions)
+
+
+def numbers_differ(decisions: list[Decision]) -> bool:
+    """Whether a nominal parameter of any joint differs from its description."""
+    return any(
         has_changed(name, e)
         for d in decisions
         for name, e in nominal_estimates(
             d.chosen.fit, d.chosen.fit.model.base, NOMINAL_UNITS
         ).items()
     )
-    return Verdict.PARAMETERS_DIFFER if changed else Verdict.CONSISTENT
-
-
-def verdict_by_stage(effects: Sequence[NamedEffect]) -> Verdict:
-    """What effects amount to: physics wins over a faulty sensor, that over a faulty recording."""
-    stages = {effect.stage for effect in effects}
-    if stages & {Stage.ACTUATOR, Stage.TRANSMISSION, Stage.JOINT}:
-        return Verdict.MISSING_PHYSICS
-    return Verdict.SENSOR_FAULT if Stage.SENSING in stages else Verdict.RECORDING_FAULT
 
 
 def has_changed(name: str, estimate: NominalEstimate) -> bool:
