@@ -12,12 +12,12 @@ from endoscope_bags.message_types import STRING
 from endoscope_bags.recording import rig_of_bag
 from endoscope_bags.rig_kind import kind_of_bag
 from endoscope_benchmarks.device_faults.motor_rig import MotorRig
-from endoscope_benchmarks.private_domain import private_domain
 from endoscope_bringup.cli import main
 from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.physics.plant_file import plant_as_text
 from endoscope_core.rig import Kind, RigKind, digest, rig_as_text
 from endoscope_nodes.nodes.recorder import RecorderNode
+from endoscope_nodes.runtime.private_domain import private_domain
 
 MS = 10**6
 
