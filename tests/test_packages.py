@@ -1,4 +1,4 @@
-"""The nine packages say truly what they contain, need and may import."""
+"""The ten packages say truly what they contain, need and may import."""
 
 import ast
 import importlib
@@ -111,7 +111,7 @@ def test_colcon_takes_all_packages_as_ament_python() -> None:
     assert listed.stdout.splitlines() == [
         f'{package.name}\tsrc/{package.name}\t(ros.ament_python)' for package in PACKAGES
     ]
-    assert len(PACKAGES) == 9
+    assert len(PACKAGES) == 10
 
 
 @each_package

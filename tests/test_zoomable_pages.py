@@ -9,7 +9,8 @@ import pytest
 from chromium import chromium, drawn
 from playwright.sync_api import Browser, Frame, Locator, Page, expect
 
-from endoscope_core.pages.zoomable import Curve, Plot, figure_html, head, scripts
+from endoscope_pages import Curve, Plot, figure_html
+from endoscope_pages.page import head, scripts
 
 TIME = 1e-3 * np.arange(20_000)
 ANGLE = 60.0 * np.sin(TIME)

@@ -18,7 +18,6 @@ from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
-import endoscope_core.pages
 from endoscope_console.access import REPORTS, Admission, Gate, Tokens
 from endoscope_console.clients import HELLO_S, ORDERS_AT_ONCE, Client, Clients, Kind
 from endoscope_console.explanations import REPORT_FILE
@@ -33,9 +32,9 @@ from endoscope_console.view import View
 from endoscope_core.choices import MODES
 from endoscope_core.rig import Rig
 from endoscope_nodes.names import JOINTS
+from endoscope_pages import ASSETS
 
 PAGE = Path(__file__).with_name('page')
-SHARED = Path(endoscope_core.pages.__file__).parent
 _SERVED = ('.css', '.html', '.js', '.svg')
 _PERIOD_NS = round(1e9 / RATE_HZ)
 _UNWATCHED_NS = 3 * _PERIOD_NS
@@ -65,7 +64,7 @@ class Console:
         """All that is answered: each file by its own route, the sockets and the reports."""
         files: dict[str, Path] = {
             **_files(PAGE, '/'),
-            **_files(SHARED, '/static/'),
+            **_files(ASSETS, '/static/'),
         }
         if '/index.html' in files:
             files['/'] = files['/index.html']

@@ -166,11 +166,11 @@ def test_every_drawing_is_whole(page):
 def stages(page):
     """The blocks of the chain, what is red with what was found in it."""
     (chain,) = re.findall(r'<ol class="chain">(.*?)</ol>', page, re.DOTALL)
-    blocks = re.findall(r'<li( class="guilty")?>(.*?)</li>', chain, re.DOTALL)
+    blocks = re.findall(r'<li( class="responsible")?>(.*?)</li>', chain, re.DOTALL)
     return [(text_of(block), bool(red)) for red, block in blocks]
 
 
-def test_only_the_guilty_stage_is_marked(page, consistent):
+def test_only_the_responsible_stage_is_marked(page, consistent):
     blocks = stages(page)
     assert [text for text, red in blocks if red] == [
         'transmission wires and sheath, wires/measured_js stribeck_friction (bend_x)'

@@ -13,8 +13,8 @@ from endoscope_benchmarks.trials.tracking_trial import (
 from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_core.control import FeedforwardLaw
 from endoscope_core.identification.law_choice import LawChoice
-from endoscope_core.pages.still_pictures import INK, STYLE, svg, thinned
 from endoscope_core.signals import periodic_signal
+from endoscope_pages.still_pictures import INK, STYLE, svg, thinned
 
 _SIZE_DEG = 94.0
 _COLOURS = {

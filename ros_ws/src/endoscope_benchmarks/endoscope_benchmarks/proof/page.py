@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from numpy.typing import NDArray
 
 from endoscope_benchmarks.proof import sentences
@@ -15,12 +14,11 @@ from endoscope_benchmarks.proof.trial import (
     report_of,
     telling,
 )
-from endoscope_core.pages import zoomable
-from endoscope_core.pages.zoomable import Curve, Plot, figure_html
 from endoscope_explain.report.figures import TIME, look
 from endoscope_explain.report.numbers import digits
 from endoscope_explain.report.sentences import plain
 from endoscope_nodes.names import JOINTS
+from endoscope_pages import Curve, Plot, figure_html, render_page
 
 Array = NDArray[np.float64]
 
@@ -29,17 +27,10 @@ PLANTS = ('nominal', 'refitted', 'augmented')
 
 def page(outcomes: Sequence[Outcome], facts: Mapping[str, str]) -> str:
     """HTML of the proof: a page that needs no other file, with links to the reports beside it."""
-    environment = Environment(
-        loader=PackageLoader('endoscope_benchmarks', 'proof/templates'),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters['digits'] = digits
-    return environment.get_template('proof.html.j2').render(
-        head=zoomable.head(),
-        scripts=zoomable.scripts(),
+    return render_page(
+        'endoscope_benchmarks',
+        'proof/templates/proof.html.j2',
+        filters={'digits': digits},
         headline=sentences.headline(outcomes),
         summary=sentences.summary(outcomes),
         rigs=[_rig(outcome) for outcome in outcomes],

@@ -1,6 +1,5 @@
 """What is said of the real recordings, as tables and as one page."""
 
-import html
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
@@ -11,10 +10,11 @@ from matplotlib.figure import Figure
 from endoscope_benchmarks.real.explained import Number, State, Tubes
 from endoscope_benchmarks.real.rig import Told
 from endoscope_benchmarks.real.takes import between_cycles
-from endoscope_core.pages.still_pictures import INK, STYLE, svg, thinned
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.decide.conclusions import NOMINAL_UNITS
 from endoscope_explain.report.numbers import MODELS, digits, in_degrees
+from endoscope_pages import html_table, render_page
+from endoscope_pages.still_pictures import INK, STYLE, svg, thinned
 
 PLANTS = ('nominal', 'refitted', 'augmented')
 LINE = {
@@ -144,18 +144,11 @@ def as_text(parts: Iterable[Section]) -> str:
 
 def page(parts: Sequence[Section]) -> str:
     """A page that needs no other file."""
-    body = []
-    for title, words, header, rows, told in parts:
-        cells = ''.join(f'<th>{html.escape(c)}</th>' for c in header)
-        lines = ''.join(
-            '<tr>' + ''.join(f'<td>{html.escape(c)}</td>' for c in row) + '</tr>' for row in rows
-        )
-        body.append(
-            f'<h2>{html.escape(title)}</h2><p>{html.escape(words)}</p>'
-            f'<table><tr>{cells}</tr>{lines}</table>'
-        )
-        body += [loops(one, header[3]) for one in told]
-    return _PAGE.replace('BODY', '\n'.join(body))
+    shown = [
+        (title, words, html_table(header, rows, words=1), [loops(one, header[3]) for one in told])
+        for title, words, header, rows, told in parts
+    ]
+    return render_page('endoscope_benchmarks', 'real/templates/real.html.j2', sections=shown)
 
 
 def loops(told: Told, last: str) -> str:
@@ -191,19 +184,3 @@ def loops(told: Told, last: str) -> str:
             *axes[0].get_legend_handles_labels(), loc='outside upper right', ncols=4, fontsize=8
         )
         return svg(figure)
-
-
-_PAGE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><title>Real recordings, explained</title>
-<style>
-body { font: 15px/1.5 sans-serif; color: #1f2933; max-width: 70rem; margin: 2rem auto }
-table { border-collapse: collapse; font-size: 13px; display: block; overflow-x: auto }
-th, td { border-bottom: 1px solid #d9dee4; padding: .25rem .6rem; text-align: left }
-td { white-space: nowrap }
-svg { max-width: 100%; height: auto; display: block; margin: 1rem 0 }
-</style></head><body>
-<h1>Real recordings of a flexible endoscope</h1>
-<p>Rmse is given as deg of the bending angle / N of both wires.</p>
-BODY
-</body></html>
-"""

@@ -81,7 +81,7 @@ def _training_figure(curve: Sequence[tuple[int, float]]) -> str:
     import matplotlib
     from matplotlib.figure import Figure
 
-    from endoscope_core.pages.still_pictures import STYLE, svg
+    from endoscope_pages.still_pictures import STYLE, svg
 
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(5.2, 3.2), layout='constrained')

@@ -2,8 +2,6 @@
 
 from importlib.resources import files
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
 from endoscope_bringup.demo import sentences
 from endoscope_bringup.demo.procedure import MEANING, MOTIONS, Method
 from endoscope_bringup.demo.results import (
@@ -13,9 +11,8 @@ from endoscope_bringup.demo.results import (
     ranking,
     table_rows,
 )
-from endoscope_core.pages import zoomable
-from endoscope_core.pages.zoomable import Curve, Plot, figure_html
 from endoscope_nodes.names import JOINTS
+from endoscope_pages import Curve, Plot, figure_html, html_table, render_page
 
 COLOUR = {
     Method.NONE: 'curve-2',
@@ -148,13 +145,6 @@ def endoscope_picture() -> str:
 
 def report_page(results: DemoResults, facts: dict[str, str]) -> str:
     """HTML of the whole report, in one file; `facts`, how it was made, stand at the foot."""
-    environment = Environment(
-        loader=PackageLoader('endoscope_bringup', 'demo/templates'),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     rows = table_rows(results)
     order = ranking(rows)
     best, shown = order[0], MOTIONS[0]
@@ -185,9 +175,10 @@ def report_page(results: DemoResults, facts: dict[str, str]) -> str:
         }
         for calibration in results.calibrations
     ]
-    return environment.get_template('report.html.j2').render(
-        head=zoomable.head(),
-        scripts=zoomable.scripts(),
+    recorded = [(topic, n, results.lost.get(topic, 0)) for topic, n in results.messages.items()]
+    return render_page(
+        'endoscope_bringup',
+        'demo/templates/report.html.j2',
         picture=endoscope_picture(),
         headline=sentences.headline(rows),
         wrong=sentences.what_is_wrong(rows),
@@ -202,6 +193,5 @@ def report_page(results: DemoResults, facts: dict[str, str]) -> str:
         rows=rows,
         tubes=tubes,
         facts=facts,
-        messages=results.messages,
-        lost=results.lost,
+        recorded=html_table(('recorded topic', 'messages', 'lost'), recorded, words=1),
     )

@@ -13,12 +13,13 @@ from endoscope_core.atomic_output import atomic_directory
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.explanation import NamedEffect, NominalEstimate
-from endoscope_explain.notebook.signals import OUTSIDE, embedded, html_table
+from endoscope_explain.notebook.signals import OUTSIDE, embedded
 from endoscope_explain.observe.predicted_signals import RecordedView, view
 from endoscope_explain.report import sentences
 from endoscope_explain.report.html_page import html_page
 from endoscope_explain.report.numbers import PLANTS, Shown, numbers_of
 from endoscope_explain.report.writing import report_mapping, write_report
+from endoscope_pages import html_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -17,6 +17,7 @@ from endoscope_bags.message_types import JOINT_STATE
 from endoscope_core.errors import EndoscopeError, nearest
 from endoscope_explain.recording import MOTOR, WIRES
 from endoscope_explain.report.sentences import table
+from endoscope_pages import html_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,13 +25,6 @@ if TYPE_CHECKING:
 
 OUTSIDE = {'loc': 'upper left', 'bbox_to_anchor': (1.0, 1.0), 'fontsize': 7, 'frameon': False}
 """Where a legend hides no curve."""
-
-
-def html_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return the same as an HTML table."""
-    lines = [''.join(f'<th>{escape(cell)}</th>' for cell in head)]
-    lines += [''.join(f'<td>{escape(cell)}</td>' for cell in row) for row in rows]
-    return '<table>' + ''.join(f'<tr>{line}</tr>' for line in lines) + '</table>'
 
 
 def embedded(figure: 'Figure') -> str:

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.pages.zoomable import Curve, Plot, figure_html
 from endoscope_explain.case import Ladder, NextExperiment
 from endoscope_explain.explanation import NINETY_PERCENT, UnknownTerm
 from endoscope_explain.report.numbers import MODELS, digits, in_degrees
 from endoscope_explain.report.sentences import LEAST_SHARE, plain
+from endoscope_pages import Curve, Plot, figure_html
 
 TIME = 'time (s)'
 

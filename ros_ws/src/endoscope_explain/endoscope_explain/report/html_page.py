@@ -3,9 +3,7 @@
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from endoscope_core.pages import zoomable
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.places import Argument
@@ -25,6 +23,7 @@ from endoscope_explain.report.passage import (
     timeline_figure,
 )
 from endoscope_explain.search.repetition import motion_repeats
+from endoscope_pages import render_page
 
 COLOURS = {
     Verdict.CONSISTENT: 'good',
@@ -63,25 +62,18 @@ def html_page(case: ExplainedCase) -> str:
     found = explanation.unknown
     unknown = found if found is not None and found.helps else None
     ladder = numbers.judged(case, case.ladder)
-    environment = Environment(
-        loader=PackageLoader('endoscope_explain', 'report/templates'),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters.update(digits=numbers.digits, plain=sentences.plain)
-    return environment.get_template('report.html.j2').render(
+    return render_page(
+        'endoscope_explain',
+        'report/templates/report.html.j2',
+        filters={'digits': numbers.digits, 'plain': sentences.plain},
         case=case,
-        head=zoomable.head(),
-        scripts=zoomable.scripts(),
         headline=sentences.HEADLINES[case.verdict],
         colour=COLOURS[case.verdict],
         sentence=sentences.verdict_sentence(case),
         change=sentences.before_and_after(case),
         reservations=sentences.reservations(case),
         chain=CHAIN,
-        guilty=_guilty(case),
+        responsible=_responsible(case),
         cut=_cut(case, joint) if case.places else '',
         effects_title=_effects_title(case),
         numbers_of=numbers.numbers_of,
@@ -175,20 +167,20 @@ def _argument(case: ExplainedCase, joint: str) -> Argument | None:
     return FUNCTIONS[places[0]].argument if places else None
 
 
-def _guilty(case: ExplainedCase) -> dict[str, list[str]]:
+def _responsible(case: ExplainedCase) -> dict[str, list[str]]:
     """What was found in each stage of the chain."""
-    guilty: dict[str, list[str]] = {}
+    found: dict[str, list[str]] = {}
     for effect in case.effects:
-        guilty.setdefault(effect.stage, []).append(f'{sentences.label(effect)} ({effect.joint})')
+        found.setdefault(effect.stage, []).append(f'{sentences.label(effect)} ({effect.joint})')
     mistaken = case.audit.mistakes()
-    places = case.places[: len(mistaken)] if guilty else case.places
+    places = case.places[: len(mistaken)] if found else case.places
     for index, place in enumerate(places):
         verdict = case.verdict if index < len(mistaken) else case.rest
         word = 'unknown' if verdict is Verdict.UNKNOWN_PHYSICS else str(verdict)
         said = f'{word.replace("_", " ")} ({place.joint})'
-        if said not in guilty.setdefault(place.stage, []):
-            guilty[place.stage].append(said)
-    return guilty
+        if said not in found.setdefault(place.stage, []):
+            found[place.stage].append(said)
+    return found
 
 
 def _cut(case: ExplainedCase, joint: str) -> str:

@@ -8,7 +8,6 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.pages.zoomable import COLUMNS, Curve, Plot, figure_html
 from endoscope_core.physics.functions.places import Argument
 from endoscope_core.physics.layout import OUT_JOINT, OUT_MOTOR_SPEED
 from endoscope_core.physics.simulator import TICK
@@ -16,6 +15,8 @@ from endoscope_explain.case import Place
 from endoscope_explain.locate.excess import WINDOW_S
 from endoscope_explain.observe.predicted_signals import RecordedView, SignalView
 from endoscope_explain.report.figures import TIME, look
+from endoscope_pages import Curve, Plot, figure_html
+from endoscope_pages.plots import COLUMNS
 
 Array = NDArray[np.float64]
 

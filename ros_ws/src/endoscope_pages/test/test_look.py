@@ -2,13 +2,13 @@
 
 import hashlib
 import re
-from importlib.resources import files
 from itertools import product
 
 import pytest
 
-PAGES = files('endoscope_core') / 'pages'
-LOOK = (PAGES / 'look.css').read_text(encoding='utf-8')
+from endoscope_pages import ASSETS
+
+LOOK = (ASSETS / 'look.css').read_text(encoding='utf-8')
 READ = ('ink', 'quiet', 'wanted', 'following', 'held', 'open', 'good', 'finding')
 """Colours in which words are set."""
 CURVES = ('actual', *(f'curve-{k}' for k in range(1, 6)), 'wire-x-pos', 'wire-y-pos')
@@ -37,14 +37,14 @@ def contrast(first: str, second: str) -> float:
 
 
 def test_uplot_is_the_published_one_and_its_licence_comes_with_it() -> None:
-    notice = (PAGES / 'NOTICE.uPlot').read_text(encoding='utf-8')
+    notice = (ASSETS / 'NOTICE.uPlot').read_text(encoding='utf-8')
     named = dict(re.findall(r'^([0-9a-f]{64})  (\S+)$', notice, flags=re.MULTILINE))
     assert set(named.values()) == {'uPlot.iife.min.js', 'uPlot.min.css', 'LICENSE.uPlot'}
     for digest, name in named.items():
-        assert hashlib.sha256((PAGES / name).read_bytes()).hexdigest() == digest, name
+        assert hashlib.sha256((ASSETS / name).read_bytes()).hexdigest() == digest, name
     (version,) = set(re.findall(r'\d+\.\d+\.\d+', notice))
-    assert f'(v{version})' in (PAGES / 'uPlot.iife.min.js').read_text(encoding='utf-8')[:100]
-    assert 'MIT' in (PAGES / 'LICENSE.uPlot').read_text(encoding='utf-8')
+    assert f'(v{version})' in (ASSETS / 'uPlot.iife.min.js').read_text(encoding='utf-8')[:100]
+    assert 'MIT' in (ASSETS / 'LICENSE.uPlot').read_text(encoding='utf-8')
 
 
 def test_the_light_look_has_every_colour_of_the_dark_one() -> None:

@@ -1,9 +1,6 @@
 """Plots in a self-contained page that can be zoomed, moved and read out with the cursor.
 
-A page gets `head()` into its head, `figure_html` of plots where they belong, and `scripts()` at its
-end. It then needs no other file and no network, and works inside a sandboxed frame that allows
-scripts. Without JavaScript, and for who cannot see the plots, each figure has a table of its
-numbers.
+Without JavaScript, and for readers who cannot see the plots, each figure has a table of numbers.
 """
 
 import json
@@ -11,11 +8,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from endoscope_pages.page import html_table
 
 Array = NDArray[np.float64]
 
@@ -24,7 +22,6 @@ MOST_READINGS = 4000
 
 MOST_BINS = 2000
 COLUMNS = 12
-_SCRIPTS = ('uPlot.iife.min.js', 'drawing.js', 'zoomable.js')
 _HINT = (
     '<span class="by-mouse">Drag to zoom, Shift and drag to move, double click to see all.</span>'
     '<span class="by-touch">Two fingers zoom, one moves.</span>'
@@ -33,6 +30,7 @@ _NOT_DRAWN = (
     '<p class="note plot-none">Without JavaScript no curves are drawn. Their numbers are in the '
     'table.</p>'
 )
+_NUMBERS = ('plot', 'curve', 'values', 'least', 'greatest', 'mean', 'root mean square')
 _ACTIONS = (
     ('all', 'all', 'show all'),
     ('left', '‹', 'move left'),
@@ -85,20 +83,41 @@ def _extremes(x: Array, y: Array, step: int) -> NDArray[np.intp]:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A curve of a plot."""
+    """A curve of a plot.
+
+    Attributes
+    ----------
+    label : str
+        Its name in the legend.
+    x : NDArray, shape (N,) or (N + 1,)
+        Where the values are, in the plot's unit, increasing unless the plot is a loop; N + 1
+        elements are the edges of the stretches in each of which a value holds.
+    y : NDArray, shape (N,)
+        Values in the plot's unit; NaN leaves a gap.
+    colour : str
+        A variable of look.css without its dashes.
+    width : float
+        Of the line, px.
+    dash : tuple of float
+        Lengths of strokes and gaps, px; none for a solid line.
+    low, high : NDArray, shape (N,), optional
+        A band around the curve.
+    time : NDArray, shape (N,), optional
+        In s, of points of a loop: what part of it another plot shows.
+    to : str
+        Label of another curve of the plot with the same `x`; the area between them is filled.
+    """
 
     label: str
-    # (N,) or (N + 1,), in the plot's unit: where the values are, increasing unless the plot is a
-    # loop; of N + 1 elements, the edges of the stretches in each of which a value holds.
     x: Array
-    y: Array  # (N,); NaN leaves a gap
-    colour: str = 'actual'  # a variable of look.css without its dashes
-    width: float = 1.4  # of the line, px
-    dash: tuple[float, ...] = ()  # lengths of strokes and gaps in px; none for a solid line
-    low: Array | None = None  # (N,), with `high` a band around the curve
+    y: Array
+    colour: str = 'actual'
+    width: float = 1.4
+    dash: tuple[float, ...] = ()
+    low: Array | None = None
     high: Array | None = None
-    time: Array | None = None  # (N,) in s, of points of a loop: what part of it another plot shows
-    to: str = ''  # label of another curve of the plot with the same `x`; the area between is filled
+    time: Array | None = None
+    to: str = ''
 
     def __post_init__(self) -> None:
         count = len(self.y)
@@ -115,24 +134,52 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Plot:
-    """One plot of a figure."""
+    """One plot of a figure.
 
-    title: str  # what is drawn, with its unit
-    # What is across, with its unit; plots of a figure that name the same zoom together.
+    Attributes
+    ----------
+    title : str
+        What is drawn, with its unit.
+    x_label : str
+        What is across, with its unit; plots of a figure that name the same zoom together.
+    curves : tuple of Curve
+        What is drawn.
+    columns : int
+        Width, of the figure's twelve columns.
+    height : int
+        Of the drawing without its axis, px.
+    loop : bool
+        Whether the curves run back and forth in `x`.
+    square : bool
+        Whether it is as high as it is wide.
+    range_x, range_y : tuple of float, optional
+        What is seen at first, in the units of the axes; by default all.
+    log : bool
+        Whether values are drawn by their logarithm.
+    level : tuple of float and str, optional
+        A value that a dotted line marks, and its word.
+    diagonal : bool
+        Whether a dotted line marks where both axes have the same value.
+    shaded : tuple of pairs of float
+        Stretches of `x` that are pointed at.
+    marks : tuple of float
+        Places on `x` that are pointed at.
+    """
+
+    title: str
     x_label: str
     curves: tuple[Curve, ...]
-    columns: int = COLUMNS  # width, of the figure's twelve columns
-    height: int = 180  # of the drawing without its axis, px
-    loop: bool = False  # whether the curves run back and forth in `x`
-    square: bool = False  # whether it is as high as it is wide
-    # with `range_y` what is seen at first; by default all
+    columns: int = COLUMNS
+    height: int = 180
+    loop: bool = False
+    square: bool = False
     range_x: tuple[float, float] | None = None
     range_y: tuple[float, float] | None = None
-    log: bool = False  # whether values are drawn by their logarithm
-    level: tuple[float, str] | None = None  # a value that a dotted line marks, and its word
-    diagonal: bool = False  # whether a dotted line marks where both axes have the same value
-    shaded: tuple[tuple[float, float], ...] = ()  # stretches of `x` that are pointed at
-    marks: tuple[float, ...] = ()  # places on `x` that are pointed at
+    log: bool = False
+    level: tuple[float, str] | None = None
+    diagonal: bool = False
+    shaded: tuple[tuple[float, float], ...] = ()
+    marks: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         for curve in self.curves:
@@ -140,18 +187,21 @@ class Plot:
                 raise ValueError(f'curve {curve.label!r} of a loop needs the time of its points')
 
 
-def head() -> str:
-    """Return what stands in the head of a page with plots: its look, as one `<style>` element."""
-    return f'<style>\n{_text("uPlot.min.css")}\n{_text("look.css")}\n</style>'
-
-
-def scripts() -> str:
-    """Return what stands at the end of a page with plots: `<script>` elements."""
-    return ''.join(f'<script>{_text(name)}</script>\n' for name in _SCRIPTS)
-
-
 def figure_html(plots: Sequence[Plot], caption: str = '') -> str:
-    """Return plots that belong together, row by row, as a `<figure>`."""
+    """Return plots that belong together, row by row, as a `<figure>`.
+
+    Parameters
+    ----------
+    plots : sequence of Plot
+        In the order of reading; a plot that a row has no room for begins the next one.
+    caption : str, optional
+        Below them, escaped here.
+
+    Returns
+    -------
+    str
+        HTML that needs the scripts of a page by `render_page` to be drawn.
+    """
     places: dict[bytes, int] = {}
     kept: list[list[float | None]] = []
 
@@ -179,10 +229,6 @@ def figure_html(plots: Sequence[Plot], caption: str = '') -> str:
             '</figure>',
         ]
     )
-
-
-def _text(name: str) -> str:
-    return (files('endoscope_core') / 'pages' / name).read_text(encoding='utf-8')
 
 
 def _in_html(text: str) -> str:
@@ -306,19 +352,10 @@ def _tools() -> str:
 
 def _numbers(plots: Sequence[Plot]) -> str:
     """The table that says in numbers what the plots show."""
-    rows = ''.join(
-        f'<tr><td class="l">{escape(plot.title)}</td><td class="l">{escape(curve.label)}</td>'
-        + ''.join(f'<td>{cell}</td>' for cell in _figures_of(curve.y))
-        + '</tr>'
-        for plot in plots
-        for curve in plot.curves
+    rows = (
+        (plot.title, curve.label, *_figures_of(curve.y)) for plot in plots for curve in plot.curves
     )
-    return (
-        '<details><summary>Numbers</summary><div class="scroll"><table><thead><tr>'
-        '<th class="l">plot</th><th class="l">curve</th><th>values</th><th>least</th>'
-        '<th>greatest</th><th>mean</th><th>root mean square</th></tr></thead>'
-        f'<tbody>{rows}</tbody></table></div></details>'
-    )
+    return f'<details><summary>Numbers</summary>{html_table(_NUMBERS, rows, words=2)}</details>'
 
 
 def _figures_of(values: Array) -> list[str]:

@@ -11,7 +11,6 @@ Array = NDArray[np.float64]
 
 INK = '#1f2933'
 GRID = '#d9dee4'
-GUILTY = '#b3261e'
 MOST_POINTS = 1200
 
 STYLE: dict[Any, Any] = {

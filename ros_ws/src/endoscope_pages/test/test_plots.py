@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from endoscope_core.pages.zoomable import (
+from endoscope_pages.plots import (
     MOST_BINS,
     MOST_READINGS,
     Curve,

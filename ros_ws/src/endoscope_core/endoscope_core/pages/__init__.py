@@ -1,1 +1,0 @@
-"""What every page of the project is made with: one look, and plots that can be zoomed."""
