@@ -1,4 +1,4 @@
-"""Nodes as processes that die, stall or are spoken over: nothing moves but on an enable.
+"""Nodes as processes that die or stall, and second senders: nothing moves but on an enable.
 
 `endoscope bench faults` tries the other rows, and each of them often; see doc/faults.md.
 """
@@ -7,9 +7,9 @@ from random import Random
 
 import pytest
 
-from endoscope_benchmarks.process_faults.process_faults import PROCESS_FAULTS, undergo
-from endoscope_benchmarks.process_faults.process_rig import ProcessRig
-from endoscope_benchmarks.process_faults.trace import HELD_S, STILL
+from endoscope_benchmarks.faults.process_faults import PROCESS_FAULTS, undergo
+from endoscope_benchmarks.faults.process_rig import ProcessRig
+from endoscope_benchmarks.faults.trace import HELD_S, STILL
 from endoscope_core.rig import load_rig
 
 RATE_HZ = 250
@@ -30,7 +30,7 @@ def rig(tmp_path_factory):
         ('console stalled for 2 s', 'FAULT'),
         ('motor_driver stalled for 0.2 s', 'FAULT'),
         ('rival on slave/servo_jp', 'FAULT'),
-        ('clutch let go and pressed within 0.6 s', None),
+        ('clutch released and pressed within 0.6 s', None),
         ('commands 0.12 to 0.5 s late, outside program', 'FAULT'),
     ],
 )

@@ -11,7 +11,7 @@ from endoscope_bags.copying import cut
 from endoscope_bags.message_types import STRING
 from endoscope_bags.recording import rig_of_bag
 from endoscope_bags.rig_kind import kind_of_bag
-from endoscope_benchmarks.device_faults.motor_rig import MotorRig
+from endoscope_benchmarks.faults.motor_rig import MotorRig
 from endoscope_bringup.cli import main
 from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.physics.plant_file import plant_as_text

@@ -1,15 +1,49 @@
-"""A rest within a motion session of the simulated graph, and what becomes of the next motion."""
+"""`endoscope bench pauses`: whether the slave obeys after a rest, or says that it does not."""
 
+import argparse
+import itertools
 import math
 import random
 from dataclasses import dataclass
 
 from sensor_msgs.msg import JointState
 
+from endoscope_benchmarks.bench import side_by_side, table_head, table_row
 from endoscope_bringup.demo.live_graph import LiveGraph
 from endoscope_core.control.limits import COUNT
 from endoscope_nodes.names import CALIBRATION_COMMAND, CALIBRATION_RUN, MASTER_NODE, SLAVE_COMMAND
 from endoscope_nodes.runtime.qos import COMMAND
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print a line for each rest and a table; return 1 if the graph was silent after one."""
+    rows = []
+    calls = [(seed, args.longest) for seed in args.seeds]
+    for done, (_, future) in enumerate(side_by_side(args.jobs, rested_and_moved, calls), 1):
+        row = future.result()
+        rows.append(row)
+        print(
+            f'{done} of {len(calls)}: seed {row.seed}, {row.rest_s:.0f} s, then {row.asked}: '
+            f'{row.became}, {row.within_s:.2f} s after the first command',
+            flush=True,
+        )
+    return _print_table(rows)
+
+
+def _print_table(rows: list['Row']) -> int:
+    print(table_head('rest', 'rests', 'obeyed', 'refused and said', 'silent', 'latest [s]'))
+    ends = (0.0, 10.0, 100.0, 1000.0, math.inf)
+    bands = [*itertools.pairwise(ends), (0.0, math.inf)]
+    for low, high in bands:
+        of_band = [row for row in rows if low <= row.rest_s < high]
+        obeyed = sum(row.became == 'obeyed' for row in of_band)
+        silent = sum(row.became == 'silent' for row in of_band)
+        latest = max((row.within_s for row in of_band), default=0.0)
+        name = 'all' if (low, high) == bands[-1] else f'from {low:.0f} s'
+        refused = len(of_band) - obeyed - silent
+        print(table_row(name, len(of_band), obeyed, refused, silent, f'{latest:.2f}'))
+    return int(any(row.became == 'silent' for row in rows))
+
 
 ASKED = ('home', 'motion', 'handle', 'calibrate')
 SAID_S = 0.5

@@ -4,7 +4,7 @@ import importlib.metadata
 
 import pytest
 
-from endoscope_benchmarks.benches import BENCHES
+from endoscope_benchmarks.commands import BENCHES
 from endoscope_bringup.cli import main
 from endoscope_bringup.subcommands import GROUP
 

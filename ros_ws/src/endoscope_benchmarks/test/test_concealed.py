@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from endoscope_benchmarks.bench import seeds
+from endoscope_benchmarks.commands import seeds
 from endoscope_benchmarks.concealed import motions
 from endoscope_benchmarks.concealed.forms import DRAWN, drawn_form, drawn_formula, visited
 from endoscope_benchmarks.concealed.judge import Statement, judged, law_at_place, law_of_effect

@@ -2,7 +2,7 @@
 
 import pytest
 
-from endoscope_benchmarks.benches.explain import judged
+from endoscope_benchmarks.explain import judged
 
 
 def effect(name, alternatives=(), **parameters):

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from endoscope_benchmarks.trials.tracking_trial import (
+from endoscope_benchmarks.papers.tracking_trial import (
     backlash_left,
     calibrate,
     never_seen_tube,

@@ -7,7 +7,7 @@ from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
 
 torch = pytest.importorskip('torch', reason='PyTorch is missing: make -C ros_ws train')
 
-from endoscope_benchmarks.networks import (  # noqa: E402
+from endoscope_benchmarks.papers.networks import (  # noqa: E402
     NETWORKS,
     PIXELS,
     TrainingSettings,
@@ -93,7 +93,7 @@ def test_folds_never_split_a_configuration(easy, monkeypatch):
         trained_with.append(tension)
         return TensionCnn(len(CLASSES_DEG)).eval()
 
-    monkeypatch.setattr('endoscope_benchmarks.networks.train_network', remember)
+    monkeypatch.setattr('endoscope_benchmarks.papers.networks.train_network', remember)
     result = cross_validate(easy, seed=0, folds=2)
     assert result.confusion.sum() == len(easy.class_deg)
     for tension in trained_with:

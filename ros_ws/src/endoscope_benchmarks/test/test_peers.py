@@ -6,18 +6,10 @@ import numpy as np
 import pytest
 
 from endoscope_benchmarks.concealed.strata import drawn_case
+from endoscope_benchmarks.peers.library import terms_of
 from endoscope_benchmarks.peers.problem import PERIOD_S, predicts, problem_of
 from endoscope_benchmarks.peers.symbolic import OF_PLANT, OF_SENSOR, named_by
-from endoscope_benchmarks.peers.term_library import terms_of
-from endoscope_benchmarks.peers.trial import (
-    PEERS,
-    Overlap,
-    changed_windows,
-    example,
-    pooled,
-    require_installed,
-    windows_in,
-)
+from endoscope_benchmarks.peers.trial import PEERS, example, require_installed
 from endoscope_core.errors import EndoscopeError
 
 
@@ -59,31 +51,9 @@ def test_a_peer_that_is_written_here_works_on_its_own_example(peer):
     assert example(peer).works
 
 
-@pytest.mark.skipif(importlib.util.find_spec('mujoco') is None, reason='peers are not installed')
-def test_mujoco_finds_the_numbers_of_its_own_example():
-    assert example('mujoco.sysid').works
-
-
-def test_regions_are_judged_by_the_windows_that_they_share():
-    true = windows_in([(1.0, 2.0)], 4.0)
-    assert np.flatnonzero(true).tolist() == [4, 5, 6, 7]
-    half = Overlap.of(windows_in([(1.5, 2.5)], 4.0), true)
-    assert half == Overlap(hits=2, extra=2, missed=2, all=16)
-    assert half.f1 == pytest.approx(0.5)
-    assert half.f1_of_all == pytest.approx(0.4)
-    silent = Overlap.of(windows_in([], 4.0), windows_in([], 4.0))
-    assert silent.f1 == 1.0
-    # A false region where nothing is concealed lowers what is found elsewhere.
-    alarm = Overlap.of(windows_in([(0.0, 1.0)], 4.0), windows_in([], 4.0))
-    assert pooled([half, silent, alarm]).f1 == pytest.approx(0.4 / 1.2)
-
-
-def test_a_law_changes_windows_and_a_rig_without_one_none(case):
-    assert 0.5 < changed_windows(case).mean() <= 1.0
-    assert not changed_windows(drawn_case('nulls', 4)).any()
-
-
-@pytest.mark.skipif(importlib.util.find_spec('emdcmp') is not None, reason='peers are installed')
+@pytest.mark.skipif(importlib.util.find_spec('pyoperon') is not None, reason='peers are installed')
 def test_what_is_missing_is_said_in_one_line():
-    with pytest.raises(EndoscopeError, match=r'^emdcmp not installed: run `make -C ros_ws peers`'):
-        require_installed(['forward selection', 'EMD comparison'])
+    with pytest.raises(
+        EndoscopeError, match=r'^pyoperon not installed: run `make -C ros_ws peers`'
+    ):
+        require_installed(['forward selection', 'Operon'])

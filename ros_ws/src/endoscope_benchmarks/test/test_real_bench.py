@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from outside_data import REAL, needs
 
+from endoscope_benchmarks.papers.real_recordings import recordings_folder
 from endoscope_benchmarks.real.rig import PLANT, Plant, Told, as_described, wide
 from endoscope_benchmarks.real.tables import markdown, rmse_rows
 from endoscope_benchmarks.real.takes import KGF, Take, between_cycles, read, require_recordings
-from endoscope_benchmarks.trials.real_recordings import recordings_folder
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics.simulator import simulate
 from endoscope_core.rig import shipped_rig

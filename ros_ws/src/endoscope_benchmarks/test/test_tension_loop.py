@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from outside_data import REAL, needs
 
-from endoscope_benchmarks.trials.real_recordings import leave_one_out_errors, tension_loop_width
+from endoscope_benchmarks.papers.real_recordings import leave_one_out_errors, tension_loop_width
 from endoscope_core.dataset import random_instrument
 from endoscope_core.dataset.rig_variation import backlash_sizes, calibration_command, in_tube
 from endoscope_core.metrics import width_at_mid_height

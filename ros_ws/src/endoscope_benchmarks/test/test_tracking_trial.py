@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from endoscope_benchmarks.trials.tracking_trial import run_tracking_trial, within_reach
+from endoscope_benchmarks.papers.tracking_trial import run_tracking_trial, within_reach
 from endoscope_core.control import FeedforwardLaw, PhysicalParameters
 from endoscope_core.control.plant_learning import LEARNT
 from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription

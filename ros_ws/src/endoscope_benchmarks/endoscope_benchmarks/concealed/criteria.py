@@ -1,11 +1,6 @@
-"""The numbers by which explanations are judged, derived from cases whose truth is known.
+"""`endoscope bench criteria`: derive the numbers by which explanations are judged."""
 
-Intervals are split conformal (Lei et al., J. Am. Stat. Assoc. 113, 2018): a limit
-is the quantile of the cases' own scores that holds the next one with the wanted chance. The
-probability of a name is a logistic function of what else was tried and of what is left (Platt, in:
-Advances in Large Margin Classifiers, MIT Press 2000).
-"""
-
+import argparse
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,8 +10,39 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from endoscope_benchmarks.concealed.trial import Row
+from endoscope_benchmarks.concealed.trial import Row, rows_of
+from endoscope_core.atomic_output import write_text
+from endoscope_core.errors import EndoscopeError
 from endoscope_explain.decide.decision import features, probability
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print, and write if asked; return 0."""
+    rows = [row for file in args.rows for row in rows_of(file).values()]
+    bank = bank_of(rows)
+    try:
+        criteria = derived(bank)
+    except ValueError as error:
+        raise EndoscopeError(str(error)) from error
+    seeds = _in_words(sorted({row.seed for row in rows}))
+    strata = ', '.join(dict.fromkeys(row.stratum for row in rows))
+    made_by = (
+        f'`endoscope bench criteria` from {len(rows)} cases of `endoscope bench concealed`, '
+        f'seeds {seeds} of {strata}'
+    )
+    print(sensitivity(bank, criteria))
+    print('\n' + reliability(bank))
+    if args.write:
+        write_text(args.write, source(criteria, made_by))
+    return 0
+
+
+def _in_words(seeds: list[int]) -> str:
+    """Increasing numbers, each stretch by its ends."""
+    begins = [n for n in seeds if n - 1 not in seeds]
+    ends = [n for n in seeds if n + 1 not in seeds]
+    return ', '.join(f'{a} to {b}' if a < b else f'{a}' for a, b in zip(begins, ends, strict=True))
+
 
 Array = NDArray[np.float64]
 

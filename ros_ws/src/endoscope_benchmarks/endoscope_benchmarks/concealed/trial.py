@@ -1,5 +1,6 @@
-"""One case explained and judged, the record and the table of many, and how weak a law may be."""
+"""`endoscope bench concealed`: what is said of rigs with something drawn and concealed."""
 
+import argparse
 import json
 import math
 import time
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from endoscope_benchmarks.bench import require_known, side_by_side
 from endoscope_benchmarks.concealed.judge import (
     Case,
     Judgement,
@@ -21,7 +23,7 @@ from endoscope_benchmarks.concealed.judge import (
     statements,
 )
 from endoscope_benchmarks.concealed.readings import misfit
-from endoscope_benchmarks.concealed.strata import as_strong, drawn_case
+from endoscope_benchmarks.concealed.strata import STRATA, as_strong, drawn_case
 from endoscope_benchmarks.concealed.strength import left
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import PlantDescription
@@ -29,6 +31,31 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.criteria import INTERVAL_WIDTH
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Estimate, Explanation, NamedEffect
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print a line for each case, then the table; return 1 if a case failed or differs."""
+    strata = args.stratum or list(STRATA)
+    require_known('stratum', strata, STRATA)
+    before = rows_of(args.against) if args.against else {}
+    cases = list(before) or [(name, seed) for seed in args.seeds for name in strata]
+    kept = rows_of(args.json) if args.json and args.json.exists() else {}
+    rows = {case: kept[case] for case in cases if case in kept}
+    for case, future in side_by_side(args.jobs, explained, [c for c in cases if c not in rows]):
+        error = future.exception()
+        rows[case] = failed(*case, error) if error else future.result()
+        print(rows[case].line(), flush=True)
+        if args.json:
+            append(args.json, rows[case])
+    known = list(STRATA)
+    print('\n' + table([rows[case] for case in sorted(cases, key=lambda c: known.index(c[0]))]))
+    differ = [(c, each) for c in before for each in differences(before[c], rows[c])]
+    for (stratum, seed), each in differ:
+        print(f'{stratum} {seed}: {each}')
+    if before:
+        print(f'{len(differ)} differences from {args.against} in {len(before)} cases')
+    return 1 if differ or any(row.verdict == 'FAILED' for row in rows.values()) else 0
+
 
 GOOD = 1.3
 """Rmse over noise up to which a second recording is predicted."""

@@ -1,7 +1,9 @@
-"""Tries the readers on spoiled files, in processes that may neither grow nor dawdle."""
+"""`endoscope bench files`: what the readers do with damaged and crafted files."""
 
+import argparse
 import resource
 import signal
+import sys
 import tempfile
 import time
 import traceback
@@ -18,7 +20,7 @@ from typing import Protocol
 import numpy as np
 from numpy.random import Generator
 
-from endoscope_benchmarks.bench import table_row
+from endoscope_benchmarks.bench import require_known, table_head, table_row
 from endoscope_benchmarks.hostile_files.mcap_case import McapCase
 from endoscope_benchmarks.hostile_files.sqlite3_case import Sqlite3Case
 from endoscope_benchmarks.hostile_files.text_case import (
@@ -29,8 +31,29 @@ from endoscope_benchmarks.hostile_files.text_case import (
     PlantCase,
     TableCase,
 )
+from endoscope_benchmarks.hostile_files.weights_case import WeightsCase
 from endoscope_core.errors import EndoscopeError, printable
 from endoscope_core.workers import worker_pool
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print a row for each kind; return 1 if a file did more than it may."""
+    require_known('kind', args.only or (), KINDS)
+    print(table_head('kind', 'cases', *OUTCOMES, 'peak memory [MB]', 'longest [s]'))
+    good = True
+    for kind in args.only or KINDS:
+        found = Outcomes(kind)
+        for batch in try_files(kind, args.cases, args.seed, args.jobs):
+            found.add(batch)
+            done = f'\r{kind}: {found.counts.total()} of {args.cases}'
+            print(done, end='', file=sys.stderr, flush=True)
+        print(file=sys.stderr)
+        print(found, flush=True)
+        for number, what in found.bad:
+            print(f'{kind} {number}: {what}', file=sys.stderr)
+        good = good and found.good
+    return 0 if good else 1
+
 
 MEMORY = 2_000_000_000
 """Bytes that a process may take."""
@@ -135,8 +158,6 @@ def _batch(kind: str, numbers: range, seed: int) -> Outcomes:
 
 def _case(kind: str, folder: Path) -> HostileCase:
     if kind == 'weights':
-        from endoscope_benchmarks.hostile_files.weights_case import WeightsCase
-
         return WeightsCase(folder)
     cases = (
         McapCase,

@@ -4,13 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from endoscope_benchmarks.papers.row import PapersBench, Row
-from endoscope_benchmarks.trials.real_recordings import (
-    left_one_out,
+from endoscope_benchmarks.papers.real_recordings import (
     models_on_real_recordings,
     real_recordings,
 )
-from endoscope_benchmarks.trials.tracking_trial import (
+from endoscope_benchmarks.papers.row import PapersBench, Row
+from endoscope_benchmarks.papers.tracking_trial import (
     backlash_left,
     calibrate,
     never_seen_tube,
@@ -253,18 +252,4 @@ def real_recordings_rows(settings: PapersBench) -> list[Row]:
                     at_most=limits.get(model) if bend == 0 else None,
                 )
             )
-    for model in ('play', 'bouc_wen'):
-        outcomes = left_one_out(recordings, model, settings.seed)
-        known = [outcome for outcome in outcomes if outcome.left is not None]
-        for outcome in known:
-            found.append(
-                Row(
-                    f'{model} by table, {outcome.bend} deg left out: model error rms '
-                    f'(uncompensated {np.rad2deg(outcome.uncompensated):.1f})',
-                    [float(np.rad2deg(outcome.left or 0.0))],
-                )
-            )
-        refused = [str(outcome.bend) for outcome in outcomes if outcome.left is None]
-        if refused:
-            settings.report(f'{model} table refuses the tubes of {", ".join(refused)} deg')
     return found

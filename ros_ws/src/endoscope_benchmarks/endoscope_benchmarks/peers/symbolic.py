@@ -1,17 +1,14 @@
 """Symbolic regression of the loudest residual, named by the state that the formula leans on."""
 
-import random
-import warnings
 from collections.abc import Callable
-from copy import deepcopy
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_benchmarks.concealed.judge import Statement
+from endoscope_benchmarks.peers.library import BENDING, EFFORT, NEGATIVE, POSITIVE
 from endoscope_benchmarks.peers.problem import OwnExample, Problem, predicts
-from endoscope_benchmarks.peers.term_library import BENDING, EFFORT, NEGATIVE, POSITIVE
 
 Array = NDArray[np.float64]
 Predictor = Callable[[Array], Array]
@@ -20,10 +17,9 @@ Regression = Callable[[Array, Array, float], Predictor]
 
 EVERY_TH = 4
 """Samples that are fitted: searches of formulas are made for some hundreds of points."""
-STEPS, GENERATIONS = 600, 200
+GENERATIONS = 200
 EFFORT_OF_CASE = 0.25
-"""Share of the steps and generations of an own example that is spent on a case."""
-REAL = ('+', '-', '*', '/', 'pow2', 'pow3', 'exp', 'sin', 'cos', 'tanh', 'abs')
+"""Share of the generations of an own example that is spent on a case."""
 SYMBOLS = 'add,sub,mul,div,sin,exp,tanh,abs,constant,variable'
 OF_PLANT = {
     't': 'length_of_time', 'u': 'command_of_command', 'e': 'servo_error_of_error',
@@ -81,44 +77,6 @@ def operon(states: Array, target: Array, effort: float, symbols: str = SYMBOLS) 
     return lambda x: np.asarray(found.predict(x))
 
 
-def elite(states: Array, target: Array, effort: float) -> Predictor:
-    """gp-elite: islands of genetic programming."""
-    from gp_elite import symbolic_regression
-
-    with warnings.catch_warnings():
-        # Where the formula that it prints departs from its model; the model is what is used.
-        warnings.filterwarnings('ignore', 'GP_ELITE', RuntimeWarning)
-        generations = round(effort * 60)
-        found = symbolic_regression(states, target, generations=generations, seed=0, parallel=False)
-    return lambda x: np.asarray(found.predict(x))
-
-
-def bayesian(states: Array, target: Array, effort: float) -> Predictor:
-    """The Bayesian machine scientist: Guimera et al., Sci. Adv. 6, 2020, from AutoRA."""
-    import pandas
-    from autora.theorist.bms import Parallel, get_priors
-
-    # It stops on complex numbers, so roots and logarithms are left out.
-    prior, operations = get_priors()
-    names = [f'x{k}' for k in range(states.shape[1])]
-    random.seed(1)
-    chain = Parallel(
-        [1.2**k for k in range(10)], variables=names, parameters=['a0', 'a1'], seed=1,
-        ops={each: operations[each] for each in REAL},
-        prior_par={f'Nopi_{each}': prior[f'Nopi_{each}'] for each in REAL},
-        x=pandas.DataFrame(states, columns=names), y=pandas.Series(target),
-    )  # fmt: skip
-    # Of the formulas that its Markov chain draws from their posterior, that of the shortest
-    # description.
-    best, shortest = chain.t1, np.inf
-    for _ in range(round(effort * STEPS)):
-        chain.mcmc_step()
-        chain.tree_swap()
-        if shortest > chain.t1.E:
-            best, shortest = deepcopy(chain.t1), chain.t1.E
-    return lambda x: np.asarray(best.predict(pandas.DataFrame(x, columns=names)))
-
-
 def operon_example() -> OwnExample:
     """Poly-10 of Poli (EuroGP 2003), which comes with pyoperon."""
     x = np.random.default_rng(1).uniform(-1.0, 1.0, (500, 10))
@@ -128,18 +86,6 @@ def operon_example() -> OwnExample:
     return _example('Poly-10', regression, x, y)
 
 
-def elite_example() -> OwnExample:
-    """Of gp-elite's own page."""
-    x = np.random.RandomState(0).uniform(1.0, 5.0, (400, 2))
-    return _example('2 + 3 sqrt(a) - b/2', elite, x, 2.0 + 3.0 * np.sqrt(x[:, 0]) - 0.5 * x[:, 1])
-
-
-def bayesian_example() -> OwnExample:
-    """A formula of its own operations, without noise, as in the paper's first test."""
-    x = np.random.default_rng(1).uniform(-2.0, 2.0, (200, 1))
-    return _example('1.5 x^2 + sin(x)', bayesian, x, 1.5 * x[:, 0] ** 2 + np.sin(x[:, 0]))
-
-
 def _example(what: str, regression: Regression, x: Array, y: Array) -> OwnExample:
     half = len(x) // 2
     left = y[half:] - regression(x[:half], y[:half], 1.0)(x[half:])
@@ -147,4 +93,4 @@ def _example(what: str, regression: Regression, x: Array, y: Array) -> OwnExampl
     return OwnExample(what, 'all but 1e-4', f'{unexplained:.1e}', unexplained < 1e-4)
 
 
-by_operon, by_elite, by_bayesian = (partial(named_by, r) for r in (operon, elite, bayesian))
+by_operon = partial(named_by, operon)

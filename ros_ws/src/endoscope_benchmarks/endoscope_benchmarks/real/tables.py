@@ -1,20 +1,63 @@
-"""What is said of the real recordings, as tables and as one page."""
+"""`endoscope bench real`: one physics for real recordings of a flexible endoscope."""
 
+import argparse
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
+from threadpoolctl import threadpool_limits
 
-from endoscope_benchmarks.real.explained import Number, State, Tubes
+from endoscope_benchmarks.bench import report
+from endoscope_benchmarks.papers.real_recordings import models_on_real_recordings, real_recordings
+from endoscope_benchmarks.real.explained import (
+    Number,
+    State,
+    Tubes,
+    explained_state,
+    explained_tubes,
+    numbers,
+    unknown_tubes,
+)
 from endoscope_benchmarks.real.rig import Told
-from endoscope_benchmarks.real.takes import between_cycles
+from endoscope_benchmarks.real.taken_out import as_table, taken_out
+from endoscope_benchmarks.real.takes import between_cycles, require_recordings
+from endoscope_core.atomic_output import write_text
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.decide.conclusions import NOMINAL_UNITS
 from endoscope_explain.report.numbers import MODELS, digits, in_degrees
 from endoscope_pages import html_table, render_page
 from endoscope_pages.still_pictures import INK, STYLE, svg, thinned
+
+PAGE = 'real.html'
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the tables and write the page."""
+    require_recordings(args.folder)
+    # A fit's matrices are tall and narrow: threads would only wait for each other.
+    with threadpool_limits(1, 'blas'):
+        if args.taken_out:
+            print(as_table(taken_out(args.folder, args.jobs, report)))
+            return 0
+        tubes = explained_tubes(args.folder, args.jobs, report)
+        state = explained_state(args.folder, tubes, args.jobs, report)
+        unknown = unknown_tubes(args.folder, tubes, report)
+        box = models_on_real_recordings(real_recordings(args.folder), 'prandtl_ishlinskii', 0)
+        parts = sections(
+            tubes,
+            numbers(tubes.explained, args.jobs),
+            {str(bend): second for bend, (_, second) in box.items()},
+            state,
+            numbers([state.fit], args.jobs),
+            unknown,
+        )
+    print(as_text(parts))
+    write_text(args.out, page(parts))
+    print(f'\nPage: {args.out}')
+    return 0
+
 
 PLANTS = ('nominal', 'refitted', 'augmented')
 LINE = {

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_benchmarks.trials.real_recordings import without_repeats
+from endoscope_benchmarks.papers.real_recordings import without_repeats
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.identification.family_fit import DESIRED, PHASE
 from endoscope_core.physics.description import JointParameters, PlantDescription, SensorParameters

@@ -1,0 +1,177 @@
+"""`endoscope console` with its graph, as a person starts it, and what its motors are told."""
+
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState, Joy
+
+from endoscope_core.errors import EndoscopeError
+from endoscope_core.exit_status import ClosedOnExit
+from endoscope_nodes.client.graph_client import joined_graph
+from endoscope_nodes.names import JOINTS, MASTER_CLUTCH, MASTER_MEASURED, MOTOR_COMMAND, MOTORS
+from endoscope_nodes.runtime.qos import EVENT, profile
+from endoscope_nodes.runtime.streams import JointReader
+from endoscope_nodes.topics import Qos
+
+PATIENCE_S = 150.0
+SAME_RAD = 1e-9
+"""Angles that are nearer to each other are the same."""
+_COMMAND = (sys.executable, '-m', 'endoscope_bringup.cli', 'console', '--port', '0')
+_DEEP = profile(Qos(20_000, reliable=False))
+
+
+class ConsoleError(EndoscopeError, RuntimeError):
+    """The program does not start, or what is waited for does not come."""
+
+
+class Heard:
+    """Angles of a topic's J joints or motors as they came."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._reader = JointReader(names)
+        self.at_ns: list[int] = []  # when each message was received, ns since the epoch
+        self.angles: list[tuple[float, ...]] = []  # rad, each of shape (J,)
+
+    def take(self, data: bytes, received_ns: int) -> None:
+        """Take a message."""
+        self.angles.append(self._reader.read(data).position)
+        self.at_ns.append(received_ns)
+
+    def forget(self) -> None:
+        """Keep the last one only."""
+        del self.at_ns[:-1], self.angles[:-1]
+
+    def changes_ns(self) -> NDArray[np.int64]:
+        """When angles came that differ from the ones before, ns since the epoch, shape (N,)."""
+        if len(self.angles) < 2:
+            return np.empty(0, dtype=np.int64)
+        steps = np.abs(np.diff(self.angles, axis=0)).max(axis=1)
+        return np.asarray(self.at_ns[1:], dtype=np.int64)[steps > SAME_RAD]
+
+    def first_change_ms(self, since_ns: int) -> float:
+        """How long after a time in ns angles first changed, in ms; NaN where they did not."""
+        changes = self.changes_ns()
+        after = changes[changes > since_ns]
+        return (int(after[0]) - since_ns) * 1e-6 if after.size else math.nan
+
+    def travel_since(self, since_ns: int) -> float:
+        """How far an angle has been from the one in force at a time in ns, at most, rad."""
+        first = max(0, bisect_right(self.at_ns, since_ns) - 1)
+        if not self.angles:
+            return 0.0
+        return float(np.abs(np.subtract(self.angles[first:], self.angles[first])).max())
+
+
+class ServedConsole(ClosedOnExit):
+    """The program, started in a folder and reached under origins of relays too; and a listener."""
+
+    def __init__(
+        self,
+        folder: Path,
+        domain: int,
+        origins: tuple[str, ...] = (),
+        *,
+        real_time: bool = False,
+    ) -> None:
+        words = [f'--origin={origin}' for origin in origins]
+        words += ['--real-time'] if real_time else []
+        self.log = folder / 'console.log'
+        with self.log.open('w') as log:
+            self._process = subprocess.Popen(
+                [*_COMMAND, *words],
+                cwd=folder,
+                env=os.environ | {'ROS_DOMAIN_ID': str(domain)},
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+            )
+        # Where the handle was said to be, and what the motors were told.
+        self.handle, self.motors = Heard(JOINTS), Heard(MOTORS)
+        self.clutches: list[tuple[int, bool]] = []  # when it was spoken of, and whether it was held
+        self._stack = ExitStack()
+        self._stack.callback(self._end)
+        try:
+            self._await_graph()
+            # Another node in the namespace would pass for a graph that answers.
+            self.client = self._stack.enter_context(joined_graph('looker_on', 'endoscope', domain))
+            for topic, heard in ((MASTER_MEASURED, self.handle), (MOTOR_COMMAND, self.motors)):
+                self.client.listen(JointState, topic, heard.take, qos=_DEEP)
+            self.client.listen(Joy, MASTER_CLUTCH, self._on_clutch, qos=EVENT)
+            operate, look_on = self.log.read_text().splitlines()[:2]
+            self.address, _, self.token = operate.split()[-1].partition('/#token=')
+            self.viewer_token = look_on.partition('#token=')[2].strip()
+            self.until(lambda: len(self.client.heard_ns) >= 9, 'all nodes')
+        except BaseException:
+            self.close()
+            raise
+
+    def _await_graph(self) -> None:
+        end = time.monotonic() + PATIENCE_S
+        while 'ready ' not in self.log.read_text():
+            if time.monotonic() > end or self._process.poll() is not None:
+                raise ConsoleError(f'the console does not start: {self.log.read_text()[-2000:]}')
+            time.sleep(0.1)
+
+    @property
+    def pid(self) -> int:
+        """Number of the server's process."""
+        return self._process.pid
+
+    @property
+    def port(self) -> int:
+        """At which the server listens."""
+        return int(self.address.rpartition(':')[2])
+
+    def _on_clutch(self, data: bytes, received_ns: int) -> None:
+        self.clutches.append((received_ns, deserialize_message(data, Joy).buttons[0] == 1))
+
+    def forget(self) -> None:
+        """Keep only what is heard from now on, and the last before."""
+        self.client.hear()
+        self.handle.forget()
+        self.motors.forget()
+        del self.clutches[:-1]
+
+    def passes(self, seconds: float) -> None:
+        """Listen for so long."""
+        self.client.wait_until(lambda: False, seconds)
+
+    def until(
+        self, condition: Callable[[], bool], what: str, patience_s: float = PATIENCE_S
+    ) -> None:
+        """Listen until something is true; ConsoleError if not in time, or the program has ended."""
+        end = time.monotonic() + patience_s
+        while not self.client.wait_until(condition, 0.5):
+            if time.monotonic() > end or self._process.poll() is not None:
+                raise ConsoleError(
+                    f'{what} does not come; {self.client.state} {self.client.why}; the console '
+                    f'said {self.log.read_text()[-2000:]}'
+                )
+
+    def released_ns(self, since_ns: int) -> int | None:
+        """When the clutch was first said to be free after a time; None where it was not."""
+        return next((at for at, held in self.clutches if at >= since_ns and not held), None)
+
+    def _end(self) -> None:
+        if self._process.poll() is None:
+            self._process.send_signal(signal.SIGINT)
+            try:
+                self._process.wait(PATIENCE_S)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()
+
+    def close(self) -> None:
+        """End program and graph as Ctrl-C does."""
+        self._stack.close()

@@ -1,1 +1,0 @@
-"""Breaks what the layers of safety guard against, in the running graph, and measures the answer."""

@@ -1,0 +1,1 @@
+"""Breaks what the layers of safety guard against in the running graph, and measures the answer."""

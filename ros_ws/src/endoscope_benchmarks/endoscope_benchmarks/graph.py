@@ -1,0 +1,311 @@
+"""`endoscope bench graph`: whether the node graph keeps its pace, in one process and in many."""
+
+import argparse
+import os
+import tempfile
+import time
+from collections import Counter, deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+from rclpy.context import Context
+from rclpy.task import Future
+from std_msgs.msg import String
+
+from endoscope_benchmarks.bench import cpu_seconds
+from endoscope_benchmarks.faults.node_processes import NODES, NodeProcesses
+from endoscope_benchmarks.faults.operator import Operator
+from endoscope_core.safety import OperatingState
+from endoscope_nodes.graph import ALL_NODES
+from endoscope_nodes.names import CLOCK_NODE, STATE_COMMAND
+from endoscope_nodes.nodes.simulation_clock import SimulationClockNode
+from endoscope_nodes.runtime.private_domain import private_domain, process_domain
+from endoscope_nodes.runtime.qos import EVENT
+from endoscope_nodes.runtime.runtime import Runtime
+
+PROCESS_RATES = (1000, 500, 250, 125)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the figures; return 1 if a target is missed."""
+    composed = run_graph_bench(args.seconds)
+    print(composed, flush=True)
+    speed = run_lock_step_bench(min(args.seconds, 20.0))
+    print(f'lock-step: {speed:.1f} times real time', flush=True)
+    if args.process_seconds:
+        for rate in PROCESS_RATES:
+            figure = run_processes_bench(rate, args.process_seconds)
+            print(figure, flush=True)
+            if figure.carried:
+                break
+    return 0 if composed.reached and speed >= TARGET_LOCK_STEP else 1
+
+
+TARGET_TICKS = 0.99
+TARGET_LATENCY_P99_MS = 1.0
+TARGET_CORES = 1.0
+TARGET_LOCK_STEP = 2.0
+_SETTLING_S = 2.0
+# Before the queue of a thousand commands is full.
+_MOVING_S = 0.5
+_SIMULATED = ('--ros-args', '-p', 'use_sim_time:=true')
+_PLAYING = {'source': 'motion', 'motion': 'periodic'}
+
+
+@dataclass(frozen=True)
+class ComposedFigure:
+    """All nodes in one process, in real time."""
+
+    seconds: float  # length of the measurement
+    ticks: float  # share of the 1 kHz ticks that took place
+    # From the instant at which the master's tick was due to the motor driver's obeying it.
+    latency_p50_ms: float
+    latency_p99_ms: float
+    cores: float  # CPU time of the process per second
+    recorded: int  # messages in the bag
+    lost: int  # messages that publishers sent and the recorder did not get
+    state: str  # operating state at the end, with the cause of a fault
+    load: float  # load average of the machine at the end
+
+    @property
+    def reached(self) -> bool:
+        """Whether every target is met."""
+        return (
+            self.ticks >= TARGET_TICKS
+            and self.latency_p99_ms < TARGET_LATENCY_P99_MS
+            and self.cores < TARGET_CORES
+            and self.lost == 0
+            and self.state == OperatingState.ENABLED
+        )
+
+    def __str__(self) -> str:
+        return (
+            f'one process, 1 kHz, {self.seconds:.0f} s: {100 * self.ticks:.2f} % of ticks, '
+            f'command to motor {self.latency_p50_ms:.2f} ms (p99 {self.latency_p99_ms:.2f}), '
+            f'{self.cores:.2f} cores, {self.recorded} messages recorded, {self.lost} lost, '
+            f'{self.state} at the end, load average {self.load:.1f}'
+        )
+
+
+def run_graph_bench(seconds: float) -> ComposedFigure:
+    """Measure all nodes, recorder included, composed here in real time, once they have settled."""
+    with tempfile.TemporaryDirectory() as folder:
+        bag = str(Path(folder) / 'bag')
+        graph = _Composition(ALL_NODES, {'recorder': {'bag': bag}, 'console': _PLAYING})
+        try:
+            graph.enable()
+            graph.serve(_SETTLING_S)
+            driver, ticker = graph.node('motor_driver'), graph.runtime.ticker
+            latency = graph.kept(driver.latency_ns)
+            ticks, missed, cpu = ticker.ticks, ticker.missed, time.process_time()
+            began = time.monotonic()
+            graph.serve(seconds)
+            elapsed, cpu = time.monotonic() - began, time.process_time() - cpu
+            ticks, missed = ticker.ticks - ticks, ticker.missed - missed
+            latency.sort()
+            machine = graph.node('supervisor').machine
+            state = f'{machine.state} {machine.cause}'.strip()
+            report = graph.node('recorder').stop()
+        finally:
+            graph.close()
+    return ComposedFigure(
+        seconds=elapsed,
+        ticks=ticks / (ticks + missed),
+        latency_p50_ms=latency[len(latency) // 2] * 1e-6,
+        latency_p99_ms=latency[len(latency) * 99 // 100] * 1e-6,
+        cores=cpu / elapsed,
+        recorded=report.message_count,
+        lost=report.lost_count,
+        state=state,
+        load=os.getloadavg()[0],
+    )
+
+
+def run_lock_step_bench(seconds: float) -> float:
+    """Simulated seconds per real second of the whole graph in lock-step, recorder included."""
+    with tempfile.TemporaryDirectory() as folder:
+        bag = str(Path(folder) / 'bag')
+        overrides = {'recorder': {'bag': bag}, 'console': _PLAYING}
+        graph = _Composition((*ALL_NODES, SimulationClockNode), overrides, _SIMULATED)
+        try:
+            graph.advance(0.5)
+            graph.enable()
+            graph.advance(0.5)
+            began = time.monotonic()
+            graph.advance(seconds)
+            return seconds / (time.monotonic() - began)
+        finally:
+            graph.close()
+
+
+class _Composition:
+    """Nodes in this process with a context and a domain of their own."""
+
+    _PATIENCE_S = 60.0
+
+    def __init__(
+        self,
+        factories: Sequence[Any],
+        overrides: Mapping[str, Mapping[str, object]],
+        args: Sequence[str] = (),
+    ) -> None:
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.runtime = Runtime(args, Context(), process_domain(), overrides)
+        for factory in factories:
+            self.runtime.add(factory)
+        self.runtime.prepare()
+        self._first = self.runtime.nodes[0]
+        self._commands = self._first.create_publisher(String, STATE_COMMAND, EVENT)
+        deadline = time.monotonic() + self._PATIENCE_S
+        while not self.runtime.connected():
+            if time.monotonic() > deadline:
+                raise RuntimeError('the nodes do not find each other')
+            time.sleep(0.01)
+
+    def node(self, name: str) -> Any:
+        return next(n for n in self.runtime.nodes if n.get_name() == name)
+
+    def enable(self) -> None:
+        machine = self.node('supervisor').machine
+        deadline = time.monotonic() + self._PATIENCE_S
+        while machine.state is not OperatingState.ENABLED:
+            if time.monotonic() > deadline:
+                raise RuntimeError(f'the slave is not enabled: {machine.present_causes}')
+            self.serve(0.1)
+            self._commands.publish(String(data='enable'))
+            self.serve(0.1)
+
+    def serve(self, seconds: float) -> None:
+        future = Future()
+        timer = self._first.create_timer(
+            seconds, lambda: future.done() or future.set_result(None), clock=self._steady
+        )
+        self.runtime.spin_until(future, seconds + self._PATIENCE_S)
+        self._first.destroy_timer(timer)
+
+    def kept(self, newest: deque[int]) -> list[int]:
+        """Keep from now on what passes through a queue that a node holds short."""
+        values: list[int] = []
+        newest.clear()
+
+        def move() -> None:
+            values.extend(newest)
+            newest.clear()
+
+        self._first.create_timer(_MOVING_S, move, clock=self._steady)
+        return values
+
+    def advance(self, seconds: float) -> None:
+        future = self.node(CLOCK_NODE).advance(seconds)
+        self.runtime.spin_until(future, 10.0 * seconds + self._PATIENCE_S)
+
+    def close(self) -> None:
+        self.runtime.close()
+
+
+CARRIED = 0.99
+_OBEYING = ('compensator', 'motor_driver')
+_SETTLING_S = 2.0
+_PATIENCE_S = 120.0
+
+
+@dataclass(frozen=True)
+class ProcessesFigure:
+    """Each node a process of its own."""
+
+    rate: int  # beats per second that were asked for
+    ticks: float  # share of them that the motor driver made
+    commands: float  # that it obeyed, as a share of those beats
+    cores: float  # CPU time of all processes per second
+    load: float  # load average of the machine at the end
+    state: str  # operating state at the end
+    # What became of the commands from node to node: how many the master sent, how many of them the
+    # compensator and the motor driver obeyed, and why the others were refused. What is missing
+    # beyond the refusals was replaced by newer ones before it was read.
+    hops: str
+
+    @property
+    def carried(self) -> bool:
+        """Whether this rate is kept up with."""
+        return self.ticks >= CARRIED and self.commands >= CARRIED
+
+    def __str__(self) -> str:
+        return (
+            f'{len(NODES)} processes at {self.rate} Hz: {100 * self.ticks:.1f} % of ticks, '
+            f'{100 * self.commands:.1f} % of commands obeyed, {self.cores:.2f} cores, '
+            f'load average {self.load:.1f}'
+            + ('' if self.carried else f': not carried, {self.state}, {self.hops}')
+        )
+
+
+def run_processes_bench(rate: int, seconds: float) -> ProcessesFigure:
+    """Measure the graph with a process for each node, at beats per second that divide 1000."""
+    domain = private_domain()
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        NodeProcesses(domain, Path(folder)) as processes,
+        Operator(domain) as operator,
+    ):
+        of_node: dict[str, dict[str, object]] = {
+            'console': {'source': 'motion'},
+            'recorder': {'bag': f'{folder}/bag'},
+        }
+        for node in NODES:
+            processes.start(node, {node: of_node.get(node, {}) | {'tick_rate': rate}})
+        _enable(operator)
+        operator.serve(_SETTLING_S)
+        before = _counts(operator)
+        cpu = sum(map(cpu_seconds, processes.pids))
+        began = time.monotonic()
+        operator.serve(seconds)
+        after, elapsed = _counts(operator), time.monotonic() - began
+        state = operator.graph.state
+        cpu = sum(map(cpu_seconds, processes.pids)) - cpu
+    done = after - before
+    due = done['ticks'] + done['missed ticks']
+    return ProcessesFigure(
+        rate=rate,
+        ticks=done['ticks'] / due,
+        commands=done['motor_driver accepted'] / due,
+        cores=cpu / elapsed,
+        load=os.getloadavg()[0],
+        state=state,
+        hops=_hops(done),
+    )
+
+
+def _hops(done: Counter[str]) -> str:
+    text = f'the master sent {done["sent"]}'
+    for node in _OBEYING:
+        refused = [f'{n} {key}' for key, n in done.items() if key.startswith(f'{node} refused')]
+        text += ', '.join([f', {node} obeyed {done[f"{node} accepted"]}', *refused])
+    return text
+
+
+def _enable(operator: Operator) -> None:
+    """Wait until every node is heard and the slave follows commands."""
+    deadline = time.monotonic() + _PATIENCE_S
+    while operator.graph.state != OperatingState.ENABLED or len(operator.graph.heard_ns) < len(
+        NODES
+    ):
+        if time.monotonic() > deadline:
+            silent = sorted(set(NODES) - set(operator.graph.heard_ns))
+            raise RuntimeError(f'{operator.graph.state or "no state"}; silent: {", ".join(silent)}')
+        operator.graph.order('enable')
+        operator.serve(1.0)
+
+
+def _counts(operator: Operator) -> Counter[str]:
+    """Ticks of the motor driver, and of each node what it sent, obeyed and refused."""
+    operator.serve(1.1)
+    device = operator.graph.health['motor_driver: device'].values
+    found = Counter({key: int(device[key]) for key in ('ticks', 'missed ticks')})
+    found['sent'] = int(operator.graph.health['console: commands'].values['published'])
+    for node in _OBEYING:
+        for key, value in operator.graph.health[f'{node}: commands'].values.items():
+            if key.startswith(('accepted', 'refused')):
+                found[f'{node} {key}'] = int(value)
+    return found

@@ -1,0 +1,150 @@
+"""Models on recordings of a real flexible endoscope, where they are at hand.
+
+The recordings (sine of 60 deg in five tubes, about two cycles) do not come with this project. They
+are looked for in ``data/kaist`` of the folder that ENDOSCOPE_SHARED names.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from endoscope_core.identification import ModelFit, Recording, fit_model
+from endoscope_core.identification.family_fit import (
+    ACTUAL,
+    CYCLE_S,
+    DESIRED,
+    NEGATIVE,
+    PHASE,
+    POSITIVE,
+)
+from endoscope_core.metrics import width_at_mid_height
+
+Array = NDArray[np.float64]
+
+_SETTLED = (0.5 * np.pi, 2.5 * np.pi)
+
+
+@dataclass(frozen=True)
+class RealRecording:
+    """One tube, N samples."""
+
+    bend: int  # of the tube, deg
+    phase: Array  # (N,), rad, which at 0.159 Hz is s
+    desired: Array  # (N,), rad
+    actual: Array  # (N,), rad
+    tension: Array  # (N, 2), N
+
+    def within(self, begin: float, end: float) -> slice:
+        """Samples between two phases in rad."""
+        first, last = np.searchsorted(self.phase, (begin, end))
+        return slice(int(first), int(last))
+
+    @property
+    def backlash_size(self) -> float:
+        """Width in rad of the settled loop."""
+        loop = self.within(*_SETTLED)
+        return width_at_mid_height(self.desired[loop], self.actual[loop])
+
+    @property
+    def tension_width(self) -> float:
+        """Width of the settled loop of the tensions; knows nothing of the actual angle."""
+        loop = self.within(*_SETTLED)
+        tension = self.tension[loop]
+        return float(
+            tension_loop_width(np.rad2deg(self.desired[loop]), tension[:, 0], tension[:, 1])
+        )
+
+
+def recordings_folder() -> Path | None:
+    """Where the recordings lie, None if they do not."""
+    shared = os.environ.get('ENDOSCOPE_SHARED')
+    folder = Path(shared or Path(__file__).parents[6] / 'shared') / 'data' / 'kaist'
+    return folder if folder.is_dir() else None
+
+
+def real_recordings(folder: Path | None = None) -> list[RealRecording]:
+    """All recordings, sorted by the bend of the tube; none where they are not at hand."""
+    folder = folder or recordings_folder()
+    if folder is None:
+        return []
+    found = []
+    # The tubes are named by their bend; other files of the folder are recordings of another form.
+    for path in folder.glob('[0-9]*.txt'):
+        table = without_repeats(np.loadtxt(path, delimiter=','))
+        found.append(
+            RealRecording(
+                int(path.stem),
+                table[:, PHASE],
+                np.deg2rad(table[:, DESIRED]),
+                np.deg2rad(table[:, ACTUAL]),
+                table[:, [POSITIVE, NEGATIVE]],
+            )
+        )
+    return sorted(found, key=lambda recording: recording.bend)
+
+
+def without_repeats(table: Array) -> Array:
+    """Rows of a recording without those that repeat the one before: the file's clock is faster."""
+    return np.asarray(table[np.diff(table[:, PHASE], prepend=-1.0) != 0.0])
+
+
+def closed_cycle(driver: Array, actual: Array) -> Recording:
+    """One whole period of angles (N,) in rad from rest, as it would go on for ever."""
+    # A model fitted to the first period alone may drift in the second, for nothing in the first
+    # says that loops close. Here the period is followed by itself, and the part before the first
+    # turning point, which belongs to the way from rest, counts only the first time.
+    turn = int(np.argmax(np.abs(driver[: len(driver) // 2])))
+    scored = np.ones(2 * len(driver), dtype=np.bool_)
+    scored[len(driver) : len(driver) + turn] = False
+    return Recording(np.tile(driver, 2), np.tile(actual, 2), scored=scored)
+
+
+def fit_first_cycle(recording: RealRecording, model: str, seed: int) -> ModelFit:
+    """A model of the first cycle."""
+    first = recording.within(0.0, CYCLE_S)
+    return fit_model([closed_cycle(recording.desired[first], recording.actual[first])], seed, model)
+
+
+def models_on_real_recordings(
+    recordings: Sequence[RealRecording], model: str, seed: int
+) -> dict[int, tuple[float, float]]:
+    """RMSE in rad on the first cycle, which was fitted, and on the second, by the tube's bend."""
+    found = {}
+    for recording in recordings:
+        error = fit_first_cycle(recording, model, seed).predict(recording.desired)
+        error = error - recording.actual
+        first = recording.within(0.0, CYCLE_S)
+        second = recording.within(CYCLE_S, 2.0 * CYCLE_S)
+        found[recording.bend] = tuple(
+            float(np.sqrt(np.mean(error[part] ** 2))) for part in (first, second)
+        )
+    return {bend: (pair[0], pair[1]) for bend, pair in found.items()}
+
+
+def tension_loop_width(
+    desired: ArrayLike, tension_positive: ArrayLike, tension_negative: ArrayLike
+) -> float:
+    """Width, in the unit of the angle (N,), of the loop of both wires' tension difference in N."""
+    # The difference of the tensions is the load of the joint's drive, and leads the desired angle:
+    # at a reversal friction turns round at the motor first. On real recordings its width falls
+    # along a straight line with the backlash size; on the simulated rig it falls from a capstan
+    # exponent of 0.7 on, and hardly changes below.
+    difference = np.asarray(tension_negative, dtype=float) - np.asarray(tension_positive)
+    return width_at_mid_height(desired, difference)
+
+
+def leave_one_out_errors(feature: ArrayLike, target: ArrayLike) -> NDArray[np.float64]:
+    """Errors (R,) of a straight line through all other points, at each of R >= 3 points."""
+    x, y = np.asarray(feature, dtype=float), np.asarray(target, dtype=float)
+    errors = np.empty_like(y)
+    for k in range(len(y)):
+        others = np.arange(len(y)) != k
+        slope, intercept = np.polyfit(x[others], y[others], 1)
+        errors[k] = slope * x[k] + intercept - y[k]
+    return errors

@@ -1,1 +1,0 @@
-"""Whole experiments on the simulated rig, without ROS."""
