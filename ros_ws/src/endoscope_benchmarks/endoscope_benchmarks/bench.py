@@ -42,7 +42,6 @@ def report(line: str) -> None:
 
 
 def table_row(*cells: object) -> str:
-    """A line of a Markdown table."""
     return f'| {" | ".join(map(str, cells))} |'
 
 

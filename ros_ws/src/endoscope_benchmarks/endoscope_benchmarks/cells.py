@@ -30,7 +30,6 @@ _OUTSIDE_DEG = (30.0, 120.0)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure and print; return 0."""
     classifier = load_classifier(args.weights, args.motion)
     tubes = tubes_of_sizes(args.seed, CLASSES_DEG, args.tubes, args.motion)
     print(f'{args.motion}, seed {args.seed}, {len(tubes.size)} tubes')

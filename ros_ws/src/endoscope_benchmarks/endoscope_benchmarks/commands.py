@@ -175,8 +175,7 @@ BENCHES: dict[str, Bench] = {
             _jobs(),
             _file('--json', 'file for all rows'),
             _file(
-                '--against',
-                'rows of an earlier run: explain the same cases, and say what differs',
+                '--against', 'rows of an earlier run: explain the same cases, and say what differs'
             ),
         ),
     ),

@@ -12,7 +12,6 @@ _SEEDS = 1_000_000
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
-    """Add `prove`."""
     parser = subparsers.add_parser(
         'prove',
         help='conceal physics in simulated rigs, explain their recordings, and compare',

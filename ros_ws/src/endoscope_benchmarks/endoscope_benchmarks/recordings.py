@@ -91,7 +91,6 @@ class Case:
 
 
 def drawn(seed: int) -> Case:
-    """The case of a seed."""
     rng = np.random.default_rng(seed)
     moving = [name for name in ACTIONS if name in MOVING]
     other = [name for name in ACTIONS if name not in MOVING]
@@ -111,7 +110,6 @@ def drawn(seed: int) -> Case:
 
 
 def act(graph: LiveGraph, case: Case) -> None:
-    """Do all that was drawn."""
     rng = np.random.default_rng([case.seed, 1])
     graph.client.ask('enable')
     for name in case.actions:

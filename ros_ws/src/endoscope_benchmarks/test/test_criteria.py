@@ -13,8 +13,8 @@ from endoscope_benchmarks.concealed.criteria import (
     sensitivity,
     source,
 )
+from endoscope_benchmarks.concealed.limits import SHARES
 from endoscope_benchmarks.concealed.strata import as_strong
-from endoscope_benchmarks.concealed.trial import SHARES
 from endoscope_explain.decide.decision import probability
 
 RNG = np.random.default_rng(1)

@@ -6,7 +6,7 @@ from outside_data import REAL, needs
 
 from endoscope_benchmarks.papers.real_recordings import recordings_folder
 from endoscope_benchmarks.real.rig import PLANT, Plant, Told, as_described, wide
-from endoscope_benchmarks.real.tables import markdown, rmse_rows
+from endoscope_benchmarks.real.tables import rmse_rows
 from endoscope_benchmarks.real.takes import KGF, Take, between_cycles, read, require_recordings
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics.simulator import simulate
@@ -64,8 +64,9 @@ def test_cycles_of_one_motion_are_alike_and_others_are_not_compared(simulated):
 def test_a_row_says_what_each_plant_leaves(simulated):
     model = wide(simulated.observation())
     plants = dict.fromkeys(('nominal', 'refitted', 'augmented'), Plant(model, as_described(model)))
-    table = markdown(('a',) * 6, rmse_rows([Told(simulated, 0.0, plants)]))
-    assert table.splitlines()[2].startswith('| simulated | 0.0')
+    [row] = rmse_rows([Told(simulated, 0.0, plants)])
+    assert row[0] == 'simulated'
+    assert row[1].startswith('0.0')
 
 
 def test_a_folder_without_recordings_is_refused_by_name(tmp_path):

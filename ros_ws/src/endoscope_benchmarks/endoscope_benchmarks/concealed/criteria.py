@@ -77,7 +77,6 @@ class Bank:
 
 
 def bank_of(rows: Sequence[Row]) -> Bank:
-    """Collect what rows say."""
     left = [row for row in rows if math.isfinite(row.beyond_form)]
     errors = np.array([e for row in rows if row.exact for e in row.errors])
     named = [(n, row, each) for n, row in enumerate(rows) for each in row.evidence]

@@ -84,10 +84,7 @@ def drawn_tree(generator: np.random.Generator, depth: int = DEPTH) -> Tree:
 
 
 def drawn_form(
-    generator: np.random.Generator,
-    place_id: str,
-    joint: str,
-    visited: tuple[float, float],
+    generator: np.random.Generator, place_id: str, joint: str, visited: tuple[float, float]
 ) -> tuple[Form, float]:
     """Draw a law by its strength (rms in the unit of the place), and the most that it may have."""
     # Over the visited range of the place's argument it is not a line; of an argument that repeats,
@@ -122,12 +119,7 @@ def drawn_form(
 
 
 def _law(
-    place: Place,
-    joint: str,
-    text: str,
-    factor: float,
-    ends: tuple[float, float],
-    lag: float | None,
+    place: Place, joint: str, text: str, factor: float, ends: tuple[float, float], lag: float | None
 ) -> TermSpec:
     return TermSpec(joint, place.id, f'{factor:.6g}*({text})', range=ends, lag_s=lag)
 

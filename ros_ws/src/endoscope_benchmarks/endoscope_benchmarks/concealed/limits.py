@@ -1,10 +1,14 @@
 """`endoscope bench limits`: how weak an effect may be and still be named."""
 
 import argparse
+from dataclasses import dataclass
 
 from endoscope_benchmarks.bench import require_known, side_by_side, table_row
 from endoscope_benchmarks.concealed.forms import DRAWN
-from endoscope_benchmarks.concealed.trial import limit_of
+from endoscope_benchmarks.concealed.judge import Case
+from endoscope_benchmarks.concealed.strata import as_strong
+from endoscope_benchmarks.concealed.trial import row_of
+from endoscope_core.physics.effects import CATALOGUE
 
 
 def run(args: argparse.Namespace) -> int:
@@ -18,3 +22,49 @@ def run(args: argparse.Namespace) -> int:
         numbers = '; '.join(found.numbers)
         print(table_row(f'`{found.effect}`', named, numbers, weaker), flush=True)
     return 0
+
+
+SHARES = (0.1, 0.032, 0.01, 0.0032, 0.001)
+"""Shares of its signal that the effect moves, each about a third of the one before."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """The weakest strength at which an effect is named."""
+
+    effect: str
+    share: float  # of the signal that it moves most; NaN where it is not named at any
+    numbers: tuple[str, ...]  # of the effect at that strength, one for each rig
+    missed_as: tuple[str, ...]  # what was said where it was weaker; empty for nothing
+
+
+def limit_of(effect: str, seeds: range) -> Limit:
+    """Make an effect weaker until it is not named on each of some rigs, one a seed."""
+    found, numbers = float('nan'), tuple[str, ...]()
+    for share in SHARES:
+        cases = [case for seed in seeds if (case := _drawn(effect, seed, share)) is not None]
+        rows = [row_of(case) for case in cases]
+        missed = tuple('+'.join(row.said) for row in rows if not row.first)
+        if missed:
+            return Limit(effect, found, numbers, missed)
+        if cases:
+            found, numbers = share, tuple(_in_units(case, effect) for case in cases)
+    return Limit(effect, found, numbers, ())
+
+
+def _drawn(effect: str, seed: int, share: float) -> Case | None:
+    """The case; None where the effect cannot move as much, since it has an end."""
+    try:
+        return as_strong(effect, seed, share)
+    except RuntimeError:
+        return None
+
+
+def _in_units(case: Case, effect: str) -> str:
+    """What a person knows the strength by: the numbers that vanish with the effect, with units."""
+    spec = next(each for each in case.true.effects if each.id == effect)
+    return ', '.join(
+        f'{p.name} {spec.parameters[p.name]:.3g}{"" if p.unit == "-" else f" {p.unit}"}'
+        for p in CATALOGUE[effect].parameters
+        if p.off == p.off and spec.parameters[p.name] != p.off
+    )

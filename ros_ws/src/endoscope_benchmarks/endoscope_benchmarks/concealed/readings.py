@@ -165,11 +165,7 @@ def worst_rms(columns: Iterable[Array]) -> float:
 
 
 def _added(
-    draw: np.random.Generator,
-    like: Array,
-    period: float,
-    noise: Noise,
-    rms: float,
+    draw: np.random.Generator, like: Array, period: float, noise: Noise, rms: float
 ) -> Array:
     added = np.zeros_like(like)
     if math.isfinite(noise.freedom):

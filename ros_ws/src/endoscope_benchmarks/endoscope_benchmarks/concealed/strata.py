@@ -15,13 +15,7 @@ from endoscope_benchmarks.concealed.forms import (
     drawn_formula,
     visited,
 )
-from endoscope_benchmarks.concealed.judge import (
-    Case,
-    Law,
-    effects_at,
-    law_at_place,
-    law_of_effect,
-)
+from endoscope_benchmarks.concealed.judge import Case, Law, effects_at, law_at_place, law_of_effect
 from endoscope_benchmarks.concealed.readings import Noise, Readings, read, record
 from endoscope_benchmarks.concealed.rigs import (
     coarse_sensors,
@@ -78,10 +72,7 @@ class _Rig:
 
 
 def catalogue(
-    generator: Generator,
-    seed: int,
-    motion: Motion = motions.commissioning,
-    weaker: float = 1.0,
+    generator: Generator, seed: int, motion: Motion = motions.commissioning, weaker: float = 1.0
 ) -> Case:
     """One effect in its own formula."""
     effect = _turn(DRAWN, seed)
@@ -230,10 +221,7 @@ def drawn_case(stratum: str, seed: int) -> Case:
 
 
 def _rig(
-    generator: Generator,
-    joints: int,
-    motion: Motion = motions.commissioning,
-    drilled: bool = False,
+    generator: Generator, joints: int, motion: Motion = motions.commissioning, drilled: bool = False
 ) -> _Rig:
     described = described_rig(generator, joints)
     return _Rig(described, true_rig(generator, described, drilled), motion(generator, joints))

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from endoscope_benchmarks.bench import require_known, side_by_side
+from endoscope_benchmarks.bench import require_known, side_by_side, table_head, table_row
 from endoscope_benchmarks.concealed.judge import (
     Case,
     Judgement,
@@ -23,7 +23,7 @@ from endoscope_benchmarks.concealed.judge import (
     statements,
 )
 from endoscope_benchmarks.concealed.readings import misfit
-from endoscope_benchmarks.concealed.strata import STRATA, as_strong, drawn_case
+from endoscope_benchmarks.concealed.strata import STRATA, drawn_case
 from endoscope_benchmarks.concealed.strength import left
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import PlantDescription
@@ -59,25 +59,11 @@ def run(args: argparse.Namespace) -> int:
 
 GOOD = 1.3
 """Rmse over noise up to which a second recording is predicted."""
-HEADS = (
-    ('', 'cases', 6),
-    ('told', 'apart', 7),
-    ('named', 'first', 8),
-    ('all', 'cases', 8),
-    ('right', 'place', 8),
-    ('exact', 'set', 8),
-    ('false', 'names', 7),
-    ('in', 'set', 8),
-    ('names', 'a set', 7),
-    ('inter-', 'vals', 8),
-    ('', 'nominal', 10),
-    ('', 'refitted', 10),
-    ('augmented', 'median', 11),
-    ('', '80th', 8),
-    ('seconds', 'median', 9),
-    ('', '95th', 7),
+COLUMNS = (
+    *('stratum', 'cases', 'told apart', 'named first of these', 'of all', 'right place'),
+    *('exact set', 'false names', 'in set', 'names a set', 'intervals', 'described', 'refitted'),
+    *('improved', '80th', 's, median', '95th'),
 )
-"""Of the table's columns after the first: two lines, and a width."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,7 +104,6 @@ class Row(Judgement):
         return not self.concealed or (bool(self.told) and not self.refitted <= GOOD)
 
     def line(self) -> str:
-        """The case in one line."""
         right = 'right' if self.exact else 'first' if self.first else 'place' if self.place else ''
         ratios = ' > '.join(f'{x:.3g}' for x in (self.nominal, self.refitted, self.augmented))
         note = f' [{self.note}]' if self.note else ''
@@ -262,16 +247,12 @@ def failed(stratum: str, seed: int, error: BaseException) -> Row:
 
 
 def table(rows: Sequence[Row]) -> str:
-    """A line for each stratum."""
-    lines = [
-        f'{first:17s}' + ''.join(f'{head[line]:>{head[2]}s}' for head in HEADS)
-        for line, first in enumerate(('', 'stratum'))
-    ]
-    for stratum in dict.fromkeys(row.stratum for row in rows):
-        cells = _cells([row for row in rows if row.stratum == stratum])
-        shown = (f'{cell:>{head[2]}s}' for cell, head in zip(cells, HEADS, strict=True))
-        lines.append(f'{stratum:17s}' + ''.join(shown))
-    return '\n'.join(lines)
+    """A line for each stratum, and one for all."""
+    strata = dict.fromkeys(row.stratum for row in rows)
+    lines = {f'`{name}`': [row for row in rows if row.stratum == name] for name in strata}
+    lines['all'] = list(rows)
+    shown = (table_row(name, *_cells(of_it)) for name, of_it in lines.items())
+    return '\n'.join([table_head(*COLUMNS), *shown])
 
 
 def _cells(rows: Sequence[Row]) -> tuple[str, ...]:
@@ -356,49 +337,3 @@ def differences(before: Row, now: Row) -> Iterator[str]:
 
 def _shown(value: str | tuple[str, ...]) -> str:
     return value if isinstance(value, str) else ' + '.join(value) or 'nothing'
-
-
-SHARES = (0.1, 0.032, 0.01, 0.0032, 0.001)
-"""Shares of its signal that the effect moves, each about a third of the one before."""
-
-
-@dataclass(frozen=True)
-class Limit:
-    """The weakest strength at which an effect is named."""
-
-    effect: str
-    share: float  # of the signal that it moves most; NaN where it is not named at any
-    numbers: tuple[str, ...]  # of the effect at that strength, one for each rig
-    missed_as: tuple[str, ...]  # what was said where it was weaker; empty for nothing
-
-
-def limit_of(effect: str, seeds: range) -> Limit:
-    """Make an effect weaker until it is not named on each of some rigs, one a seed."""
-    found, numbers = float('nan'), tuple[str, ...]()
-    for share in SHARES:
-        cases = [case for seed in seeds if (case := _drawn(effect, seed, share)) is not None]
-        rows = [row_of(case) for case in cases]
-        missed = tuple('+'.join(row.said) for row in rows if not row.first)
-        if missed:
-            return Limit(effect, found, numbers, missed)
-        if cases:
-            found, numbers = share, tuple(_in_units(case, effect) for case in cases)
-    return Limit(effect, found, numbers, ())
-
-
-def _drawn(effect: str, seed: int, share: float) -> Case | None:
-    """The case; None where the effect cannot move as much, since it has an end."""
-    try:
-        return as_strong(effect, seed, share)
-    except RuntimeError:
-        return None
-
-
-def _in_units(case: Case, effect: str) -> str:
-    """What a person knows the strength by: the numbers that vanish with the effect, with units."""
-    spec = next(each for each in case.true.effects if each.id == effect)
-    return ', '.join(
-        f'{p.name} {spec.parameters[p.name]:.3g}{"" if p.unit == "-" else f" {p.unit}"}'
-        for p in CATALOGUE[effect].parameters
-        if p.off == p.off and spec.parameters[p.name] != p.off
-    )

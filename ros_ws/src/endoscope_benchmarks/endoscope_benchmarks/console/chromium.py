@@ -103,7 +103,6 @@ class Chromium(ClosedOnExit):
         return Tab(self, address)
 
     def close_others(self, tab: 'Tab') -> None:
-        """Close every tab but one."""
         for target in self.call('Target.getTargets')['targetInfos']:
             if target['type'] == 'page' and target['targetId'] != tab.target:
                 self.call('Target.closeTarget', targetId=target['targetId'])
@@ -120,7 +119,6 @@ class Chromium(ClosedOnExit):
         self._process.wait()
 
     def close(self) -> None:
-        """End it and remove its profile."""
         self._socket.close()
         self.kill()
         self._folder.cleanup()
@@ -178,5 +176,4 @@ class Tab:
         )
 
     def close(self) -> None:
-        """Close it, as its cross does."""
         self._browser.call('Target.closeTarget', targetId=self.target)

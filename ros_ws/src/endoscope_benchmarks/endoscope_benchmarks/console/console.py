@@ -56,10 +56,7 @@ def run(args: argparse.Namespace) -> int:
         tempfile.TemporaryDirectory() as folder,
         Relay() as network,
         ServedConsole(
-            Path(folder),
-            private_domain(),
-            (network.address,),
-            real_time=args.real_time,
+            Path(folder), private_domain(), (network.address,), real_time=args.real_time
         ) as console,
     ):
         network.target = console.port

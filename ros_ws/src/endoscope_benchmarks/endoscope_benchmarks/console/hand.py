@@ -75,7 +75,6 @@ class Hand(ClosedOnExit):
             client.ask('resume' if client.state == 'PAUSED' else 'enable')
 
     def give_back(self) -> None:
-        """Look on only, from now on."""
         self.let_go()
         if self._seen(_MINE):
             self._seen(f'{_CLAIM}.click()')
@@ -91,7 +90,6 @@ class Hand(ClosedOnExit):
             self.tab.key(code, True, repeats=True)
 
     def let_go(self) -> None:
-        """Let go of every key."""
         for code in reversed(self._held):
             self.tab.key(code, False)
         self._held = []
@@ -146,5 +144,4 @@ class Hand(ClosedOnExit):
         return held and fresh
 
     def close(self) -> None:
-        """End the browser."""
         self.browser.close()

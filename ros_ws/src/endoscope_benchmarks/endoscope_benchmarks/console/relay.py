@@ -88,7 +88,6 @@ class Relay(ClosedOnExit):
             end.close()
 
     def close(self) -> None:
-        """Pass nothing on any more."""
         self._open = False
         self._thread.join()
         for side in list(self._peers):

@@ -44,12 +44,10 @@ class Heard:
         self.angles: list[tuple[float, ...]] = []  # rad, each of shape (J,)
 
     def take(self, data: bytes, received_ns: int) -> None:
-        """Take a message."""
         self.angles.append(self._reader.read(data).position)
         self.at_ns.append(received_ns)
 
     def forget(self) -> None:
-        """Keep the last one only."""
         del self.at_ns[:-1], self.angles[:-1]
 
     def changes_ns(self) -> NDArray[np.int64]:
@@ -77,12 +75,7 @@ class ServedConsole(ClosedOnExit):
     """The program, started in a folder and reached under origins of relays too; and a listener."""
 
     def __init__(
-        self,
-        folder: Path,
-        domain: int,
-        origins: tuple[str, ...] = (),
-        *,
-        real_time: bool = False,
+        self, folder: Path, domain: int, origins: tuple[str, ...] = (), *, real_time: bool = False
     ) -> None:
         words = [f'--origin={origin}' for origin in origins]
         words += ['--real-time'] if real_time else []
@@ -125,12 +118,10 @@ class ServedConsole(ClosedOnExit):
 
     @property
     def pid(self) -> int:
-        """Number of the server's process."""
         return self._process.pid
 
     @property
     def port(self) -> int:
-        """At which the server listens."""
         return int(self.address.rpartition(':')[2])
 
     def _on_clutch(self, data: bytes, received_ns: int) -> None:
@@ -144,7 +135,6 @@ class ServedConsole(ClosedOnExit):
         del self.clutches[:-1]
 
     def passes(self, seconds: float) -> None:
-        """Listen for so long."""
         self.client.wait_until(lambda: False, seconds)
 
     def until(

@@ -127,10 +127,7 @@ MOTOR_FAULTS: dict[str, MotorFault] = {
     'overload': MotorFault('a servo shuts down', _set('overload', 1), cause='overload'),
     'brown-out': MotorFault('supply falls to 9 V', _set('supply', 1, 9.0), cause='input voltage'),
     'restart': MotorFault('a servo restarts', _set('restart', 2), cause='servo 2'),
-    'node hangs': MotorFault(
-        'executor of the nodes hangs for 0.5 s',
-        lambda rig: rig.block(0.5),
-    ),
+    'node hangs': MotorFault('executor of the nodes hangs for 0.5 s', lambda rig: rig.block(0.5)),
     'over-tension': MotorFault('a wire at 80 N', _overpull, cause='over the ceiling'),
     'load cells silent': MotorFault('load cells fall silent', _stop_weighing, cause='silent'),
     'clutch released': MotorFault('operator lets go of the clutch', _let_go, 'ENABLED'),

@@ -124,7 +124,6 @@ class MotorRig(ClosedOnExit):
 
     @property
     def state(self) -> str:
-        """Operating state as last heard."""
         return self.states[-1][1] if self.states else ''
 
     def _on_state(self, message: String) -> None:
@@ -159,7 +158,6 @@ class MotorRig(ClosedOnExit):
         return done
 
     def order(self, text: str) -> None:
-        """Give a state command."""
         self._orders.publish(String(data=text))
 
     def enable_and_move(self) -> None:

@@ -70,11 +70,9 @@ class NodeProcesses(ClosedOnExit):
         process.join(_END_S)
 
     def stall(self, name: str) -> None:
-        """Stop a process until :meth:`resume`."""
         os.kill(self._pid(name), signal.SIGSTOP)
 
     def resume(self, name: str) -> None:
-        """Let a stalled process go on."""
         os.kill(self._pid(name), signal.SIGCONT)
 
     def end(self, name: str) -> None:
@@ -92,7 +90,6 @@ class NodeProcesses(ClosedOnExit):
         return pid
 
     def close(self) -> None:
-        """End all."""
         for process in self._processes.values():
             process.terminate()
         for name in self.running:

@@ -161,7 +161,6 @@ class Operator(ClosedOnExit):
         return [self.sent[self._turn * 7919 % len(self.sent)]] if self.replays else []
 
     def close(self) -> None:
-        """Leave the graph."""
         self.graph.close()
         self.node.destroy_node()
         self._context.shutdown()

@@ -64,7 +64,6 @@ class ProcessRig(ClosedOnExit):
         return set(self.operator.graph.heard_ns) >= set(NODES)
 
     def start(self, name: str) -> None:
-        """Start a process."""
         first = 'motor_driver' if name == GRAPH else name
         parameters: dict[str, dict[str, object]] = {first: {'tick_rate': self.rate}}
         if name in ('console', GRAPH):
@@ -80,7 +79,6 @@ class ProcessRig(ClosedOnExit):
         self.processes.start(name, parameters)
 
     def kill(self, name: str) -> None:
-        """End a process with SIGKILL."""
         self.processes.kill(name)
         self._forget(name)
 
@@ -90,7 +88,6 @@ class ProcessRig(ClosedOnExit):
             self.kill(name)
 
     def end(self, name: str) -> None:
-        """End a process in good order."""
         self.processes.end(name)
         self.operator.serve(0.2)
         self._forget(name)
@@ -119,6 +116,5 @@ class ProcessRig(ClosedOnExit):
         return time.monotonic() - began if operator.serve(PATIENCE_S, moving) else None
 
     def close(self) -> None:
-        """End everything."""
         self.operator.close()
         self.processes.close()

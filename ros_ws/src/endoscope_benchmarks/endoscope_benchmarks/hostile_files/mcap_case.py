@@ -43,8 +43,6 @@ Message = tuple[str, int, bytes]
 class McapCase:
     """A recording that is spoiled again for each case, read and recovered."""
 
-    name = 'mcap'
-
     def __init__(self, folder: Path) -> None:
         self._path, self._out = folder / 'case.mcap', folder / 'recovered'
         self._whole = [_of_this_project(folder / 'whole.mcap')]
@@ -60,7 +58,6 @@ class McapCase:
         self._messages = _stored(open_bag(folder / 'case.mcap'))
 
     def spoil(self, rng: Generator) -> None:
-        """Write a case."""
         self._which = int(rng.integers(len(self._whole)))
         data = self._whole[self._which]
         self._places: list[int] | None = None

@@ -55,15 +55,12 @@ def write_sqlite3_bag(folder: Path) -> Path:
 class Sqlite3Case:
     """A recording in sqlite3 storage; no checksum tells what its bytes were."""
 
-    name = 'db3'
-
     def __init__(self, folder: Path) -> None:
         self._path = write_sqlite3_bag(folder / 'bag')
         self._sound = self._path.read_bytes()
         self._saved = folder / 'saved'
 
     def spoil(self, rng: Generator) -> None:
-        """Write a case."""
         self._path.write_bytes(self._sound)
         way = rng.integers(4)
         if way >= 2:

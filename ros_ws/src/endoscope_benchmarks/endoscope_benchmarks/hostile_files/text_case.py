@@ -2,7 +2,9 @@
 
 import math
 import shutil
-from dataclasses import asdict
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -60,53 +62,51 @@ topics:
 """
 
 
-class MetadataCase:
-    """The `metadata.yaml` of a sound recording."""
+@dataclass(frozen=True)
+class TextCase:
+    """A text that is damaged again for each case."""
 
-    name = 'metadata.yaml'
-
-    def __init__(self, folder: Path) -> None:
-        self._bag = folder / 'bag'
-        with BagWriter(self._bag) as writer:
-            for k in range(20):
-                data = encode_joint_state(['bend_x'], k, position=[float(k)])
-                writer.write_raw('/rig/slave/servo_jp', JOINT_STATE, data, k)
-        self._path = self._bag / 'metadata.yaml'
-        self._text = self._path.read_text()
+    path: Path
+    text: str
+    damaged: Callable[[str, Generator], bytes]
+    read: Callable[[], bool]  # whether what came out is right
 
     def spoil(self, rng: Generator) -> None:
-        """Write a case."""
-        self._path.write_bytes(spoiled_yaml(self._text, rng))
+        self.path.write_bytes(self.damaged(self.text, rng))
 
-    def read(self) -> bool:
-        """Look into the recording, whose messages are what they were."""
-        recording = open_bag(self._bag)
+
+def _damaged_table(text: str, rng: Generator) -> bytes:
+    return spoiled_table(text, rng, ',')
+
+
+def metadata_case(folder: Path) -> TextCase:
+    """The `metadata.yaml` of a sound recording, whose messages are what they were."""
+    bag = folder / 'bag'
+    with BagWriter(bag) as writer:
+        for k in range(20):
+            data = encode_joint_state(['bend_x'], k, position=[float(k)])
+            writer.write_raw('/rig/slave/servo_jp', JOINT_STATE, data, k)
+
+    def read() -> bool:
+        recording = open_bag(bag)
         str(bag_information(recording)).encode()
         position = recording.joint_state('slave/servo_jp').require('position')
         return bool((position[:, 0] == np.arange(20)).all())
 
+    path = bag / 'metadata.yaml'
+    return TextCase(path, path.read_text(), spoiled_yaml, read)
 
-class PlantCase:
-    """A plant.yaml."""
 
-    name = 'plant.yaml'
+def plant_case(folder: Path) -> TextCase:
+    """A plant.yaml; every parameter has to be one that an instrument can have."""
+    path = folder / 'plant.yaml'
+    gravity = EffectSpec('gravity', 'bend_x', {'moment_nm': 0.01})
+    joint = JointParameters(friction_profile=(0.3, -0.1))
+    term = TermSpec('bend_x', 'load_of_angle', '0.01*tanh(q/0.5)', range=(-1.5, 1.5))
+    save_plant(PlantDescription({'bend_x': joint}, effects=(gravity,), terms=(term,)), path)
 
-    def __init__(self, folder: Path) -> None:
-        self._path = folder / 'plant.yaml'
-        gravity = EffectSpec('gravity', 'bend_x', {'moment_nm': 0.01})
-        joint = JointParameters(friction_profile=(0.3, -0.1))
-        term = TermSpec('bend_x', 'load_of_angle', '0.01*tanh(q/0.5)', range=(-1.5, 1.5))
-        plant = PlantDescription({'bend_x': joint}, effects=(gravity,), terms=(term,))
-        save_plant(plant, self._path)
-        self._text = self._path.read_text()
-
-    def spoil(self, rng: Generator) -> None:
-        """Write a case."""
-        self._path.write_bytes(spoiled_yaml(self._text, rng))
-
-    def read(self) -> bool:
-        """Read it; every parameter has to be one that an instrument can have."""
-        plant = load_plant(self._path)
+    def read() -> bool:
+        plant = load_plant(path)
         sets = [asdict(joint) for joint in plant.joints.values()] + [asdict(plant.sensors)]
         return all(
             NUMBERS[key].low <= number <= NUMBERS[key].high
@@ -115,83 +115,46 @@ class PlantCase:
             for number in np.atleast_1d(value)
         )
 
+    return TextCase(path, path.read_text(), spoiled_yaml, read)
 
-class CellsCase:
-    """A calibration of load cells."""
 
-    name = 'cells.yaml'
+def cells_case(folder: Path) -> TextCase:
+    """A calibration of load cells; counts have to become finite tensions."""
+    path = folder / 'cells.yaml'
 
-    def __init__(self, folder: Path) -> None:
-        self._path = folder / 'cells.yaml'
-
-    def spoil(self, rng: Generator) -> None:
-        """Write a case."""
-        self._path.write_bytes(spoiled_yaml(_CELLS, rng))
-
-    def read(self) -> bool:
-        """Read it; counts have to become finite tensions."""
-        cells = load_calibration(self._path, _WIRES).wires.values()
+    def read() -> bool:
+        cells = load_calibration(path, _WIRES).wires.values()
         return all(math.isfinite(cell.tension(1e5)) for cell in cells)
 
-
-class MappingCase:
-    """The mapping of a text table."""
-
-    name = 'mapping.yaml'
-
-    def __init__(self, folder: Path) -> None:
-        self._path, self._table = folder / 'mapping.yaml', folder / 'sound.csv'
-        self._out = folder / 'converted'
-        self._table.write_text(_table_text())
-
-    def spoil(self, rng: Generator) -> None:
-        """Write a case."""
-        self._path.write_bytes(spoiled_yaml(_MAPPING, rng))
-
-    def read(self) -> bool:
-        """Convert a sound table by it."""
-        return _convert(self._table, self._path, self._out)
+    return TextCase(path, _CELLS, spoiled_yaml, read)
 
 
-class TableCase:
-    """A text table for `endoscope convert`."""
-
-    name = 'text table'
-
-    def __init__(self, folder: Path) -> None:
-        self._path, self._mapping = folder / 'table.csv', folder / 'sound.yaml'
-        self._out = folder / 'converted'
-        self._mapping.write_text(_MAPPING)
-
-    def spoil(self, rng: Generator) -> None:
-        """Write a case."""
-        self._path.write_bytes(spoiled_table(_table_text(), rng, ','))
-
-    def read(self) -> bool:
-        """Convert it."""
-        return _convert(self._path, self._mapping, self._out)
+def mapping_case(folder: Path) -> TextCase:
+    """The mapping of a text table, by which a sound table is converted."""
+    path, table = folder / 'mapping.yaml', folder / 'sound.csv'
+    table.write_text(_table_text())
+    return TextCase(path, _MAPPING, spoiled_yaml, partial(_convert, table, path, folder / 'out'))
 
 
-class CommandCase:
-    """A command file."""
+def table_case(folder: Path) -> TextCase:
+    path, mapping = folder / 'table.csv', folder / 'sound.yaml'
+    mapping.write_text(_MAPPING)
+    read = partial(_convert, path, mapping, folder / 'out')
+    return TextCase(path, _table_text(), _damaged_table, read)
 
-    name = 'command CSV'
 
-    def __init__(self, folder: Path) -> None:
-        self._path = folder / 'commands.csv'
-        time = np.arange(0.0, 1.0, 0.01)
-        write_command_file(self._path, time, np.sin(np.stack([time, 2.0 * time], axis=1)))
-        self._text = self._path.read_text()
+def command_case(folder: Path) -> TextCase:
+    """A command file; time has to increase and angles to be finite."""
+    path = folder / 'commands.csv'
+    time = np.arange(0.0, 1.0, 0.01)
+    write_command_file(path, time, np.sin(np.stack([time, 2.0 * time], axis=1)))
 
-    def spoil(self, rng: Generator) -> None:
-        """Write a case."""
-        self._path.write_bytes(spoiled_table(self._text, rng, ','))
-
-    def read(self) -> bool:
-        """Read it; time has to increase and angles to be finite."""
-        table = read_command_file(self._path)
+    def read() -> bool:
+        table = read_command_file(path)
         increases = bool((table.time[1:] > table.time[:-1]).all())
         return increases and bool(np.isfinite(table.angle).all())
+
+    return TextCase(path, path.read_text(), _damaged_table, read)
 
 
 def _table_text() -> str:

@@ -33,8 +33,6 @@ class _Program:
 class WeightsCase:
     """Weights that come with the project, spoiled and loaded."""
 
-    name = 'weights'
-
     def __init__(self, folder: Path) -> None:
         self._path, self._mark = folder / 'weights.safetensors', folder / 'ran'
         self._sound = shipped_weights(SINUSOID)
@@ -47,7 +45,6 @@ class WeightsCase:
         self._sound_answer = self._answer()
 
     def spoil(self, rng: Generator) -> None:
-        """Write a case."""
         sound = self._sound
         data, described = sound.read_bytes(), sound.with_suffix('.json').read_bytes()
         way = rng.integers(7)

@@ -88,9 +88,7 @@ class Mistake:
 
 
 def scaled(
-    quantity: str,
-    factor: float | Callable[[Generator], float],
-    columns: Columns | None = None,
+    quantity: str, factor: float | Callable[[Generator], float], columns: Columns | None = None
 ) -> Change:
     """Give a quantity, or some of its columns, in another unit."""
 
@@ -106,8 +104,6 @@ def scaled(
 
 
 def ordered(order: tuple[int, ...], *quantities: str) -> Change:
-    """Give quantities in another order."""
-
     def change(recording: Recording, _: Generator) -> Recording:
         changed = {}
         for quantity in quantities:
@@ -154,8 +150,6 @@ def frozen(*quantities: str) -> Change:
 
 
 def together(*changes: Change) -> Change:
-    """Make several mistakes at once."""
-
     def change(recording: Recording, rng: Generator) -> Recording:
         for one in changes:
             recording = one(recording, rng)
@@ -165,7 +159,6 @@ def together(*changes: Change) -> Change:
 
 
 def one_column(rng: Generator, columns: int) -> list[int]:
-    """Any one of the columns."""
     return [int(rng.integers(columns))]
 
 

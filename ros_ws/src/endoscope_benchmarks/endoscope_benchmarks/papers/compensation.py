@@ -4,10 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from endoscope_benchmarks.papers.real_recordings import (
-    models_on_real_recordings,
-    real_recordings,
-)
+from endoscope_benchmarks.papers.real_recordings import models_on_real_recordings, real_recordings
 from endoscope_benchmarks.papers.row import PapersBench, Row
 from endoscope_benchmarks.papers.tracking_trial import (
     backlash_left,
@@ -18,10 +15,7 @@ from endoscope_benchmarks.papers.tracking_trial import (
     within_reach,
 )
 from endoscope_core.classifier.weights_file import load_classifier
-from endoscope_core.control import (
-    FeedforwardLaw,
-    RecursiveHysteresisController,
-)
+from endoscope_core.control import FeedforwardLaw, RecursiveHysteresisController
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.hysteresis.inverse import MODELS
 from endoscope_core.identification.law_choice import LawChoice
@@ -30,19 +24,9 @@ from endoscope_core.signals import non_periodic_signal, periodic_signal
 
 _PAPER = {
     ('descending', 'periodic'): ('18.08 ± 0.35', '4.65 ± 0.13', '50.02 ± 1.16', '10.77 ± 0.48'),
-    ('descending', 'non_periodic'): (
-        '23.64 ± 0.08',
-        '6.34 ± 0.18',
-        '56.88 ± 1.26',
-        '11.47 ± 0.71',
-    ),
+    ('descending', 'non_periodic'): ('23.64 ± 0.08', '6.34 ± 0.18', '56.88 ± 1.26', '11.47 ± 0.71'),
     ('transverse', 'periodic'): ('25.95 ± 0.60', '6.99 ± 0.65', '68.48 ± 0.77', '17.05 ± 0.16'),
-    ('transverse', 'non_periodic'): (
-        '26.78 ± 0.13',
-        '6.33 ± 0.18',
-        '70.55 ± 0.51',
-        '17.68 ± 0.10',
-    ),
+    ('transverse', 'non_periodic'): ('26.78 ± 0.13', '6.33 ± 0.18', '70.55 ± 0.51', '17.68 ± 0.10'),
 }
 # Under the calibration sinusoid; tubes of the family of these sizes have the paper's backlash under
 # `60 sin t`.

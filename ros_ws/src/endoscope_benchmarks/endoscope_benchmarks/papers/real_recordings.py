@@ -106,7 +106,6 @@ def closed_cycle(driver: Array, actual: Array) -> Recording:
 
 
 def fit_first_cycle(recording: RealRecording, model: str, seed: int) -> ModelFit:
-    """A model of the first cycle."""
     first = recording.within(0.0, CYCLE_S)
     return fit_model([closed_cycle(recording.desired[first], recording.actual[first])], seed, model)
 

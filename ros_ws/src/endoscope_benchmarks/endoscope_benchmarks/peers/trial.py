@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from endoscope_benchmarks.bench import require_known, side_by_side
+from endoscope_benchmarks.bench import require_known, side_by_side, table_head, table_row
 from endoscope_benchmarks.concealed.judge import Statement, judged, statements
 from endoscope_benchmarks.concealed.strata import STRATA, drawn_case
 from endoscope_benchmarks.concealed.trial import explanation_of
@@ -35,7 +35,6 @@ def run(args: argparse.Namespace) -> int:
     require_known('peer', names, PEERS)
     require_known('stratum', args.stratum, STRATA)
     require_installed(names)
-    print(', '.join(f'{p} {_version(p)}' for name in names if (p := PEERS[name][0])), flush=True)
     with worker_pool(args.jobs) as pool:
         shown = dict(zip(names, pool.map(example, names), strict=True))
     cases = [(names, name, seed) for name in args.stratum for seed in args.seeds]
@@ -105,16 +104,17 @@ def example(name: str) -> OwnExample:
 
 def table(shown: Mapping[str, OwnExample], found: Sequence[Answer]) -> str:
     """A line for each peer, and one for ourselves."""
-    head = ('peer', 'own example', 'it must give', 'it gave', 'first', 'place', 'false', 's')
-    rows: list[tuple[str, ...]] = [head]
+    judged_by = ('named first', 'right place', 'false names', 's, median')
+    lines = [table_head('peer', 'version', 'example', 'required', 'obtained', *judged_by)]
     for name, own in [*shown.items(), (OURS, OwnExample('', '', '', True))]:
         of_it = [each for each in found if each.peer == name]
         counts = (sum(getattr(a, what) for a in of_it) for what in ('first', 'place', 'false'))
         gave = own.gave if own.works else f'{own.gave} FAILS'
         seconds = f'{np.median([a.seconds for a in of_it]):.1f}' if of_it else '-'
-        rows.append((name, own.what, own.must, gave, *map(str, counts), seconds))
-    widths = [max(map(len, column)) + 2 for column in zip(*rows, strict=True)]
-    return '\n'.join(''.join(map(str.ljust, row, widths)).rstrip() for row in rows)
+        package = PEERS[name][0] if name in PEERS else ''
+        version_ = f'{package} {_version(package)}'.strip()
+        lines.append(table_row(name, version_, own.what, own.must, gave, *counts, seconds))
+    return '\n'.join(lines)
 
 
 def _version(package: str) -> str:

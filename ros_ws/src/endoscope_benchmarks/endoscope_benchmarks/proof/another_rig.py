@@ -131,10 +131,7 @@ FORMS: dict[str, Form] = {
         reached={'stop_rad': (0.4, 0.8)},
     ),
     'breathing': Form(
-        'the patient breathes',
-        'breath_nm',
-        5e-4,
-        {'breath_hz': (0.15, 0.5), 'breath_phase': _TURN},
+        'the patient breathes', 'breath_nm', 5e-4, {'breath_hz': (0.15, 0.5), 'breath_phase': _TURN}
     ),
     'external_load': Form(
         'something begins to push at the tip',

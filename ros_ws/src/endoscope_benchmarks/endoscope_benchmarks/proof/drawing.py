@@ -15,13 +15,7 @@ from endoscope_benchmarks.concealed.rigs import described_rig, true_rig
 from endoscope_benchmarks.concealed.strata import AIM, as_strong, drawn_case
 from endoscope_benchmarks.concealed.strength import drawn_as_strong
 from endoscope_benchmarks.proof import OTHER, SLAVE
-from endoscope_benchmarks.proof.another_rig import (
-    FEW_NODES,
-    FORMS,
-    Laws,
-    drawn_laws,
-    read,
-)
+from endoscope_benchmarks.proof.another_rig import FEW_NODES, FORMS, Laws, drawn_laws, read
 from endoscope_core.errors import EndoscopeError, nearest
 from endoscope_core.physics import JointParameters, PlantDescription
 from endoscope_core.physics.effect import Stage

@@ -7,13 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_benchmarks.proof import sentences
-from endoscope_benchmarks.proof.trial import (
-    TRUTH,
-    Outcome,
-    folder_of,
-    report_of,
-    telling,
-)
+from endoscope_benchmarks.proof.trial import TRUTH, Outcome, folder_of, report_of, telling
 from endoscope_explain.report.figures import TIME, look
 from endoscope_explain.report.numbers import digits
 from endoscope_explain.report.sentences import plain

@@ -13,7 +13,6 @@ from endoscope_explain.report.numbers import digits
 
 
 def headline(outcomes: Sequence[Outcome]) -> str:
-    """How many were right."""
     right = sum(each.judgement.exact for each in outcomes)
     return f'{right} of {len(outcomes)} right: what was concealed is named, and nothing else'
 
@@ -32,7 +31,6 @@ def summary(outcomes: Sequence[Outcome]) -> str:
 
 
 def concealed(outcome: Outcome) -> str:
-    """What was concealed."""
     laws = [
         f'{law.name} on {law.joint or "all joints"}'
         if law.name in CATALOGUE

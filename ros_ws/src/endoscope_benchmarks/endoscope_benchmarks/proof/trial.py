@@ -251,7 +251,6 @@ def report_of(number: int) -> str:
 
 
 def folder_of(number: int) -> str:
-    """Name of a rig's folder."""
     return f'rig_{number}'
 
 

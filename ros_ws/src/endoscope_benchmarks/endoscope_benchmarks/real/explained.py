@@ -8,22 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from endoscope_benchmarks.real.rig import (
-    OF_TUBE,
-    Plant,
-    Told,
-    as_described,
-    best_refitted,
-    wide,
-)
-from endoscope_benchmarks.real.takes import (
-    OTHERS,
-    STATE,
-    TIGHTENED,
-    TUBES,
-    UNKNOWN_TUBES,
-    read,
-)
+from endoscope_benchmarks.real.rig import OF_TUBE, Plant, Told, as_described, best_refitted, wide
+from endoscope_benchmarks.real.takes import OTHERS, STATE, TIGHTENED, TUBES, UNKNOWN_TUBES, read
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.decide.decision import decide
 from endoscope_explain.explanation import NINETY_PERCENT

@@ -88,7 +88,6 @@ class Plant:
 
     @staticmethod
     def of(found: Fit) -> 'Plant':
-        """That of a fit."""
         return Plant(found.model, found.theta)
 
     def held(self, free: Sequence[str], observation: JointObservation) -> 'Plant':
@@ -100,7 +99,6 @@ class Plant:
         return Plant(model, self.theta[kept])
 
     def on(self, observation: JointObservation) -> 'Plant':
-        """The plant on another recording."""
         return Plant(replace(self.model, observation=observation), self.theta)
 
     def with_cell_of_unknown_unit(self) -> 'Plant':

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
-from endoscope_benchmarks.bench import report
+from endoscope_benchmarks.bench import report, table_head, table_row
 from endoscope_benchmarks.papers.real_recordings import models_on_real_recordings, real_recordings
 from endoscope_benchmarks.real.explained import (
     Number,
@@ -72,12 +72,6 @@ UNITS = {
 }
 
 Rows = list[tuple[str, ...]]
-
-
-def markdown(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table that can be read as it stands."""
-    lines = [header, ['---'] * len(header), *rows]
-    return '\n'.join(f'| {" | ".join(line)} |' for line in lines)
 
 
 BETWEEN = ('two cycles differ by', 'angle, times that')
@@ -181,7 +175,8 @@ def sections(
 def as_text(parts: Iterable[Section]) -> str:
     """The tables as they are printed."""
     return '\n\n'.join(
-        f'{title}\n{words}\n\n{markdown(header, rows)}' for title, words, header, rows, _ in parts
+        '\n'.join([title, words, '', table_head(*header), *(table_row(*row) for row in rows)])
+        for title, words, header, rows, _ in parts
     )
 
 
