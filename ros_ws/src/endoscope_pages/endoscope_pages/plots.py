@@ -30,6 +30,7 @@ _NOT_DRAWN = (
     '<p class="note plot-none">Without JavaScript no curves are drawn. Their numbers are in the '
     'table.</p>'
 )
+_AS_GIVEN = ('x_label', 'height', 'loop', 'square', 'log', 'level', 'diagonal', 'shaded', 'marks')
 _NUMBERS = ('plot', 'curve', 'values', 'least', 'greatest', 'mean', 'root mean square')
 _ACTIONS = (
     ('all', 'all', 'show all'),
@@ -55,10 +56,10 @@ def banded(x: Array, y: Array) -> tuple[Array, Array, Array]:
     return np.append(x[begins], x[-1]), low, high
 
 
-def telling(x: Array, y: Array) -> NDArray[np.intp]:
+def decimated(x: Array, y: Array) -> NDArray[np.intp]:
     """Indices of readings that stand for all readings of a loop.
 
-    Of each stretch in time the first, the last, and those of least and greatest x and y.
+    Of x and y (N,), of each stretch in time the first, the last, and the least and greatest.
     """
     step = math.ceil(2 * len(y) / MOST_READINGS)
     while len(kept := _extremes(x, y, step)) > MOST_READINGS:
@@ -217,6 +218,7 @@ def figure_html(plots: Sequence[Plot], caption: str = '') -> str:
         for plot, labelled in zip(plots, _lowest(plots), strict=True)
     ]
     data = json.dumps({'x': kept, 'plots': specs}, separators=(',', ':'), allow_nan=False)
+    data = data.replace('<', '\\u003c')  # so that no label ends the <script> element
     return '\n'.join(
         [
             '<figure class="plots">',
@@ -225,15 +227,10 @@ def figure_html(plots: Sequence[Plot], caption: str = '') -> str:
             _NOT_DRAWN,
             f'<figcaption>{escape(caption)}</figcaption>' if caption else '',
             _numbers(plots),
-            f'<script type="application/json" class="plot-data">{_in_html(data)}</script>',
+            f'<script type="application/json" class="plot-data">{data}</script>',
             '</figure>',
         ]
     )
-
-
-def _in_html(text: str) -> str:
-    """JSON that can end no `<script>` element."""
-    return text.replace('<', '\\u003c')
 
 
 def _rounded(values: Array) -> list[float | None]:
@@ -258,24 +255,12 @@ def _range(values: Sequence[Array], margin: float, *, log: bool = False) -> list
 def _spec(plot: Plot, place_of: Any, labelled: bool) -> dict[str, Any]:
     """What the page's script draws."""
     labels = [curve.label for curve in plot.curves]
+    values = [v for c in plot.curves for v in (c.y, c.low, c.high) if v is not None]
     return {
-        'x_label': plot.x_label,
-        'height': plot.height,
-        'loop': plot.loop,
-        'square': plot.square,
-        'log': plot.log,
-        'level': plot.level,
-        'diagonal': plot.diagonal,
-        'shaded': plot.shaded,
-        'marks': plot.marks,
+        **{name: getattr(plot, name) for name in _AS_GIVEN},
         'labelled': labelled,
         'range_x': plot.range_x or _range([c.x for c in plot.curves], 0.03 if plot.loop else 0.0),
-        'range_y': plot.range_y
-        or _range(
-            [v for c in plot.curves for v in (c.y, c.low, c.high) if v is not None],
-            0.06,
-            log=plot.log,
-        ),
+        'range_y': plot.range_y or _range(values, 0.06, log=plot.log),
         'curves': [_curve(plot, curve, place_of, labels) for curve in plot.curves],
     }
 
@@ -289,7 +274,7 @@ def _curve(plot: Plot, curve: Curve, place_of: Any, labels: list[str]) -> dict[s
     }
     x, y, time = curve.x, curve.y, curve.time
     if len(y) > MOST_READINGS and plot.loop:
-        kept = telling(x, y)
+        kept = decimated(x, y)
         x, y, time = x[kept], y[kept], None if time is None else time[kept]
     elif len(y) > MOST_READINGS and not curve.to and curve.low is None:
         edges, low, high = banded(x, y)

@@ -14,8 +14,8 @@ from endoscope_pages.plots import (
     Curve,
     Plot,
     banded,
+    decimated,
     figure_html,
-    telling,
 )
 
 RNG = np.random.default_rng(1)
@@ -59,7 +59,7 @@ def test_a_stretch_without_readings_is_a_gap() -> None:
 
 def test_a_loop_keeps_its_extremes_and_its_order() -> None:
     x, y = np.sin(LONG), np.cos(LONG) + 0.01 * RNG.standard_normal(len(LONG))
-    kept = telling(x, y)
+    kept = decimated(x, y)
     assert len(kept) <= MOST_READINGS
     assert np.all(np.diff(kept) > 0)
     for values in (x, y):
