@@ -27,7 +27,7 @@ _ASKED = 'asked for (deg)'
 _DASHES = (6.0, 4.0)
 
 
-def loops_figure(results: DemoResults, tube: str, motion: str, best: Method, caption: str) -> str:
+def loops_figure(results: DemoResults, tube: str, motion: str, best: Method) -> str:
     """Actual against desired angle of each joint, uncompensated and by one method."""
     runs = [results.run(tube, motion, method) for method in dict.fromkeys((Method.NONE, best))]
     plots = [
@@ -53,12 +53,10 @@ def loops_figure(results: DemoResults, tube: str, motion: str, best: Method, cap
         )
         for column, joint in enumerate(JOINTS)
     ]
-    return figure_html(plots, caption)
+    return figure_html(plots, sentences.of_loops(results, tube, motion, best))
 
 
-def tracking_figure(
-    results: DemoResults, tube: str, motion: str, methods: list[Method], caption: str
-) -> str:
+def tracking_figure(results: DemoResults, tube: str, motion: str, methods: list[Method]) -> str:
     """Angle over time beside what was asked for, a row for each method, and below the errors."""
     runs = [results.run(tube, motion, method) for method in methods]
     plots = [_track(run, column, joint) for run in runs for column, joint in enumerate(JOINTS)]
@@ -76,7 +74,7 @@ def tracking_figure(
         )
         for column, joint in enumerate(JOINTS)
     ]
-    return figure_html(plots, caption)
+    return figure_html(plots, sentences.of_tracking(results, tube, motion, methods))
 
 
 def _track(run: TrackingRun, column: int, joint: str) -> Plot:
@@ -93,7 +91,7 @@ def _track(run: TrackingRun, column: int, joint: str) -> Plot:
     return Plot(f'{joint} (deg)', _TIME, (tip, asked), columns=6, height=110, range_y=LIMITS_DEG)
 
 
-def calibration_figure(calibration: CalibrationOutcome, caption: str) -> str:
+def calibration_figure(calibration: CalibrationOutcome) -> str:
     """Loop, and the tension of each wire, those of a joint together."""
     loops = tuple(
         Curve(
@@ -135,7 +133,7 @@ def calibration_figure(calibration: CalibrationOutcome, caption: str) -> str:
                 range_y=(0.0, highest),
             )
         )
-    return figure_html(plots, caption)
+    return figure_html(plots, sentences.of_calibration(calibration.facts))
 
 
 def endoscope_picture() -> str:
@@ -152,25 +150,10 @@ def report_page(results: DemoResults, facts: dict[str, str]) -> str:
         {
             'calibration': calibration,
             'title': calibration.facts.tube.capitalize(),
-            'calibration_figure': calibration_figure(
-                calibration, sentences.of_calibration(calibration.facts)
-            ),
-            'loops_figure': loops_figure(
-                results,
-                calibration.facts.tube,
-                shown,
-                best,
-                sentences.of_loops(results, calibration.facts.tube, shown, best),
-            ),
+            'calibration_figure': calibration_figure(calibration),
+            'loops_figure': loops_figure(results, calibration.facts.tube, shown, best),
             'tracking': [
-                tracking_figure(
-                    results,
-                    calibration.facts.tube,
-                    m,
-                    order,
-                    sentences.of_tracking(results, calibration.facts.tube, m, order),
-                )
-                for m in MOTIONS
+                tracking_figure(results, calibration.facts.tube, m, order) for m in MOTIONS
             ],
         }
         for calibration in results.calibrations
