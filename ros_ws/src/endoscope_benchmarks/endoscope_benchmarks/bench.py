@@ -1,11 +1,13 @@
 """What every bench does: work side by side, progress, rows of tables, and the machine."""
 
+import json
 import os
 import platform
 import sys
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import Future, as_completed
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +41,25 @@ def side_by_side[C: tuple[Any, ...]](
 def report(line: str) -> None:
     """Say on stderr how far it has come."""
     print(line, file=sys.stderr, flush=True)
+
+
+def kept_rows[R](file: Path, kind: type[R]) -> list[R]:
+    """Read what `keep_row` wrote; EndoscopeError for a line that is none of the dataclass."""
+    rows = []
+    for number, line in enumerate(file.read_text(encoding='utf-8').splitlines(), 1):
+        try:
+            fields = json.loads(line)
+            lists = {k: tuple(v) for k, v in fields.items() if isinstance(v, list)}
+            rows.append(kind(**{**fields, **lists}))
+        except (ValueError, TypeError) as error:
+            raise EndoscopeError(f'{file}, line {number}: no row of a case: {error}') from error
+    return rows
+
+
+def keep_row(file: Path, row: Any) -> None:
+    """Add a row, which is a dataclass, at the end of a file of JSON lines."""
+    with file.open('a', encoding='utf-8') as lines:
+        lines.write(json.dumps(asdict(row)) + '\n')
 
 
 def table_row(*cells: object) -> str:

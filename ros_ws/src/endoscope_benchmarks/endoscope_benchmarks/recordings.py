@@ -1,13 +1,12 @@
 """`endoscope bench recordings`: what is said of the simulated slave's own recordings."""
 
 import argparse
-import json
 import math
 import os
 import shutil
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +14,8 @@ from numpy.typing import NDArray
 
 from endoscope_bags import open_bag
 from endoscope_bags.copying import cut
-from endoscope_benchmarks.bench import side_by_side, table_head, table_row
+from endoscope_benchmarks.bench import keep_row, kept_rows, side_by_side, table_head, table_row
 from endoscope_bringup.demo.live_graph import LiveGraph
-from endoscope_core.atomic_output import write_text
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import JointParameters, PlantDescription, save_plant
 from endoscope_core.physics.family import shipped_family
@@ -30,29 +28,23 @@ from endoscope_nodes.names import JOINTS, MASTER_NODE
 
 def run(args: argparse.Namespace) -> int:
     """Print a line for each recording and a table; return 0."""
-    seeds = list(args.seeds)
     args.out.mkdir(parents=True, exist_ok=True)
-    files = {seed: args.out / f'{seed}.json' for seed in seeds}
-    rows = {
-        seed: Row(**json.loads(file.read_text(encoding='utf-8')))
-        for seed, file in files.items()
-        if file.exists()
-    }
-    calls = [(seed, args.out) for seed in seeds if seed not in rows]
-    for _, future in side_by_side(args.jobs, recorded_and_explained, calls):
+    kept = args.out / 'rows.jsonl'
+    rows = {row.seed: row for row in (kept_rows(kept, Row) if kept.exists() else ())}
+    calls = [(seed, args.out) for seed in args.seeds if seed not in rows]
+    for done, (_, future) in enumerate(
+        side_by_side(args.jobs, recorded_and_explained, calls), len(args.seeds) - len(calls) + 1
+    ):
         row = future.result()
         rows[row.seed] = row
-        write_text(files[row.seed], json.dumps(asdict(row), indent=1) + '\n')
-        print(f'{len(rows)} of {len(seeds)}: {_line(row)}', flush=True)
-    _print_table([rows[seed] for seed in seeds])
+        keep_row(kept, row)
+        print(
+            f'{done} of {len(args.seeds)}: seed {row.seed}, {row.way}; {row.length:.1f} s, load '
+            f'{row.load:.1f}: {row.sentence} ({row.seconds:.0f} s)',
+            flush=True,
+        )
+    _print_table([rows[seed] for seed in args.seeds])
     return 0
-
-
-def _line(row: 'Row') -> str:
-    return (
-        f'seed {row.seed}, {row.way}; {row.length:.1f} s, load {row.load:.1f}: {row.sentence} '
-        f'({row.seconds:.0f} s)'
-    )
 
 
 def _print_table(rows: list['Row']) -> None:

@@ -1,4 +1,4 @@
-"""Training of the networks of the first paper, where PyTorch is installed."""
+"""Training of the network of the first paper, where PyTorch is installed."""
 
 import numpy as np
 import pytest
@@ -8,13 +8,10 @@ from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
 torch = pytest.importorskip('torch', reason='PyTorch is missing: make -C ros_ws train')
 
 from endoscope_benchmarks.papers.networks import (  # noqa: E402
-    NETWORKS,
-    PIXELS,
     TrainingSettings,
     cross_validate,
     grouped_folds,
     predict,
-    recurrence_plots,
     train_network,
     use_one_thread,
 )
@@ -59,24 +56,6 @@ def test_table_2_reduces_a_recording_to_one_feature_vector():
     assert isinstance(network.dense, torch.nn.Linear)
 
 
-@pytest.mark.parametrize('kind', ['mlp', 'recurrence_plot_cnn'])
-def test_the_networks_compared_with_learn_too(easy, kind):
-    settings = TrainingSettings(batch_size=14, epochs=50, learning_rate=1e-3, decay=0.98)
-    network = train_network(easy.tension, easy.class_deg, 1, settings, kind)
-    likeliest = np.array(CLASSES_DEG)[np.argmax(predict(network, easy.tension), axis=1)]
-    assert np.mean(np.abs(likeliest - easy.class_deg)) < 6.0
-    assert type(network) is NETWORKS[kind]
-
-
-def test_a_recurrence_plot_is_the_distance_of_every_two_states():
-    tension = torch.from_numpy(np.linspace(2.0, 8.0, 9000)).float().expand(1, 4, 9000)
-    plots = recurrence_plots(tension)
-    states = tension[0, 0].reshape(PIXELS, -1).mean(dim=1)
-    assert plots.shape == (1, 4, PIXELS, PIXELS)
-    assert plots[0, 2, 7, 30] == pytest.approx(float(states[30] - states[7]), abs=1e-5)
-    assert torch.equal(plots, plots.transpose(2, 3))
-
-
 def test_training_learns_and_repeats_with_its_seed(easy):
     first = train_network(easy.tension, easy.class_deg, 1, SHORT)
     again = train_network(easy.tension, easy.class_deg, 1, SHORT)
@@ -89,7 +68,7 @@ def test_training_learns_and_repeats_with_its_seed(easy):
 def test_folds_never_split_a_configuration(easy, monkeypatch):
     trained_with = []
 
-    def remember(tension, class_deg, seed, settings, kind):
+    def remember(tension, class_deg, seed):
         trained_with.append(tension)
         return TensionCnn(len(CLASSES_DEG)).eval()
 

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from endoscope_benchmarks.concealed.trial import append, differences, failed, rows_of
+from endoscope_benchmarks.bench import keep_row
+from endoscope_benchmarks.concealed.trial import differences, failed, rows_of
 from endoscope_bringup.cli import main
 from endoscope_core.errors import EndoscopeError
 
@@ -24,12 +25,12 @@ ROW = replace(
 @pytest.fixture
 def record(tmp_path):
     file = tmp_path / 'rows.jsonl'
-    append(file, ROW)
+    keep_row(file, ROW)
     return file
 
 
 def test_a_row_is_read_as_it_was_kept(record):
-    append(record, replace(ROW, seed=8))
+    keep_row(record, replace(ROW, seed=8))
     assert {key: row.said for key, row in rows_of(record).items()} == {
         ('sinusoid', 7): ROW.said,
         ('sinusoid', 8): ROW.said,

@@ -1,18 +1,24 @@
 """`endoscope bench concealed`: what is said of rigs with something drawn and concealed."""
 
 import argparse
-import json
 import math
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from math import isclose
 from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from endoscope_benchmarks.bench import require_known, side_by_side, table_head, table_row
+from endoscope_benchmarks.bench import (
+    keep_row,
+    kept_rows,
+    require_known,
+    side_by_side,
+    table_head,
+    table_row,
+)
 from endoscope_benchmarks.concealed.judge import (
     Case,
     Judgement,
@@ -25,7 +31,6 @@ from endoscope_benchmarks.concealed.judge import (
 from endoscope_benchmarks.concealed.readings import misfit
 from endoscope_benchmarks.concealed.strata import STRATA, drawn_case
 from endoscope_benchmarks.concealed.strength import left
-from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.criteria import INTERVAL_WIDTH
@@ -46,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
         rows[case] = failed(*case, error) if error else future.result()
         print(rows[case].line(), flush=True)
         if args.json:
-            append(args.json, rows[case])
+            keep_row(args.json, rows[case])
     known = list(STRATA)
     print('\n' + table([rows[case] for case in sorted(cases, key=lambda c: known.index(c[0]))]))
     differ = [(c, each) for c in before for each in differences(before[c], rows[c])]
@@ -300,22 +305,7 @@ cost, in which a misfit of twice the noise has a share of a hundredth."""
 
 def rows_of(file: Path) -> dict[CaseKey, Row]:
     """Read a record; EndoscopeError for a line that is none of a row."""
-    rows = {}
-    for number, line in enumerate(file.read_text(encoding='utf-8').splitlines(), 1):
-        try:
-            fields = json.loads(line)
-            lists = {k: tuple(v) for k, v in fields.items() if isinstance(v, list)}
-            row = Row(**{**fields, **lists})
-        except (ValueError, TypeError) as error:
-            raise EndoscopeError(f'{file}, line {number}: no row of a case: {error}') from error
-        rows[row.stratum, row.seed] = row
-    return rows
-
-
-def append(file: Path, row: Row) -> None:
-    """Add a row at the end of a record."""
-    with file.open('a', encoding='utf-8') as lines:
-        lines.write(json.dumps(asdict(row)) + '\n')
+    return {(row.stratum, row.seed): row for row in kept_rows(file, Row)}
 
 
 def differences(before: Row, now: Row) -> Iterator[str]:

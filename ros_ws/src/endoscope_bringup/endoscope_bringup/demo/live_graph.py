@@ -68,11 +68,11 @@ class LiveGraph(ClosedOnExit):
         nodes: Sequence[Callable[[NodeContext], EndoscopeNode]] = NODES,
         log_level: str = 'fatal',
     ) -> None:
-        # Load cells may fall silent.
-        given: dict[str, dict[str, object]] = {
-            CLOCK_NODE: {'timeout': PATIENCE_S, 'wait_for': [MOTOR_MEASURED]},
-            **overrides,
-        }
+        given = dict(overrides)
+        if lock_step:
+            # Load cells may fall silent.
+            clock = {'timeout': PATIENCE_S, 'wait_for': [MOTOR_MEASURED]}
+            given[CLOCK_NODE] = clock | overrides.get(CLOCK_NODE, {})
         if bag is not None:
             given['recorder'] = {'bag': str(bag)}
         arguments = ['--ros-args', '--log-level', log_level]
