@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_benchmarks.papers.tracking_trial import configuration_of
 from endoscope_core.calibration import TensionGapError, TensionRecord
 from endoscope_core.classifier.classification import (
     ClassificationResult,
@@ -17,10 +18,8 @@ from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_core.dataset import (
     CLASSES_DEG,
     TubeConfiguration,
-    configuration_of_size,
-    random_instrument,
 )
-from endoscope_core.dataset.rig_variation import GREATEST_UNEVENNESS, calibration_command
+from endoscope_core.dataset.rig_variation import calibration_command
 from endoscope_core.physics import SensorModel, simulate
 from endoscope_core.signals import (
     CALIBRATION_MOTIONS,
@@ -133,12 +132,7 @@ def tubes_of_all_classes(seed: int, per_class: int, motion: CalibrationMotion) -
     for class_deg in CLASSES_DEG:
         for number in range(per_class):
             generator = np.random.default_rng([_UNSEEN, seed, class_deg, number])
-            found = None
-            while found is None:
-                unevenness = generator.uniform(-GREATEST_UNEVENNESS, GREATEST_UNEVENNESS)
-                found = configuration_of_size(
-                    random_instrument(generator), float(np.deg2rad(class_deg)), unevenness
-                )
+            found = configuration_of(generator, float(np.deg2rad(class_deg)))
             trajectory = simulate(found.plant, calibration_command(found.plant, motion))
             wires = trajectory.tension.reshape(len(trajectory.time), -1)
             tubes.append(ReadTube(class_deg, found, wires))

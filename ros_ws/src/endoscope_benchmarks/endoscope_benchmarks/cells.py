@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_benchmarks.papers.tracking_trial import configuration_of
 from endoscope_core.classifier.classification import ClassificationResult, nearest_class
 from endoscope_core.classifier.cnn_classifier import CnnClassifier, first, logarithm, stretched
 from endoscope_core.classifier.held_out_calibration import (
@@ -17,8 +18,8 @@ from endoscope_core.classifier.held_out_calibration import (
     read,
 )
 from endoscope_core.classifier.weights_file import load_classifier
-from endoscope_core.dataset import CLASSES_DEG, configuration_of_size, random_instrument
-from endoscope_core.dataset.rig_variation import GREATEST_UNEVENNESS, calibration_command
+from endoscope_core.dataset import CLASSES_DEG
+from endoscope_core.dataset.rig_variation import calibration_command
 from endoscope_core.dataset.training_rigs import training_rigs
 from endoscope_core.physics import simulate
 from endoscope_core.signals import calibration_motion
@@ -45,20 +46,11 @@ def run(args: argparse.Namespace) -> int:
     }
     cases |= {fault: {'fault': fault} for fault in FAULTS}
     for name, case in cases.items():
-        _print(name, outcome(classifier, tubes, args.seed, **case))
+        _judge(name, classifier, tubes, args.seed, **case)
     for size in _OUTSIDE_DEG:
         outside = tubes_outside(args.seed, size, args.tubes, args.motion)
-        _print(f'good, tubes of {size:.0f} deg', outcome(classifier, outside, args.seed))
+        _judge(f'good, tubes of {size:.0f} deg', classifier, outside, args.seed)
     return 0
-
-
-def _print(name: str, found: 'Outcome') -> None:
-
-    shares = [100.0 * share for share in (found.right, found.wrong, found.refused)]
-    rmse, holds = np.rad2deg(found.rmse), 100.0 * found.holds
-    line = f'{name:36s} {shares[0]:5.1f} % {shares[1]:5.1f} % {shares[2]:6.1f} %  '
-    told = '     -           -' if np.isnan(rmse) else f'{rmse:6.2f} deg  {holds:6.1f} %'
-    print(line + told, flush=True)
 
 
 Single = NDArray[np.float32]
@@ -89,18 +81,6 @@ class Tubes:
     tension: Single  # (R, N, 4) in N at 1 kHz, what the classifier reads of the record
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What a classifier says of R tubes."""
-
-    # Shares; right and wrong by the class nearest to the true size.
-    right: float
-    wrong: float
-    refused: float
-    rmse: float  # error of the size in rad of what was not refused
-    holds: float  # share of sizes in their 90 % interval, of what was not refused
-
-
 def tubes_of_sizes(seed: int, sizes_deg: tuple[float, ...], each: int, motion: str) -> Tubes:
     """Random instruments, which trained nothing, in tubes that give them a size to 1 deg."""
     recorded = calibration_motion(motion)
@@ -108,11 +88,8 @@ def tubes_of_sizes(seed: int, sizes_deg: tuple[float, ...], each: int, motion: s
     for size_deg in sizes_deg:
         for number in range(each):
             generator = np.random.default_rng([_NEVER_SEEN, seed, round(10 * size_deg), number])
-            size = np.deg2rad(size_deg + SIZE_SPREAD_DEG * generator.uniform(-1.0, 1.0))
-            found = None
-            while found is None:
-                unevenness = generator.uniform(-GREATEST_UNEVENNESS, GREATEST_UNEVENNESS)
-                found = configuration_of_size(random_instrument(generator), size, unevenness)
+            size = float(np.deg2rad(size_deg + SIZE_SPREAD_DEG * generator.uniform(-1.0, 1.0)))
+            found = configuration_of(generator, size)
             trajectory = simulate(found.plant, calibration_command(found.plant, recorded))
             wires = trajectory.tension.reshape(len(trajectory.time), -1)
             sizes.append(found.backlash_size)
@@ -127,7 +104,8 @@ def tubes_outside(seed: int, size_deg: float, count: int, motion: str) -> Tubes:
     return Tubes(rigs.size, rigs.tension)
 
 
-def outcome(
+def _judge(
+    name: str,
     classifier: CnnClassifier,
     tubes: Tubes,
     seed: int,
@@ -136,8 +114,8 @@ def outcome(
     zero: float = 0.0,
     gain: float = 0.0,
     fault: str = '',
-) -> Outcome:
-    """Judge tubes as cells read them; `zero`, `gain` and `period` as `read` takes them."""
+) -> None:
+    """Judge tubes as cells `read` them, with its period, zero and gain, and print."""
     generator = np.random.default_rng([_NEVER_SEEN, seed, period])
     results: list[ClassificationResult] = []
     refused: list[bool] = []
@@ -154,10 +132,12 @@ def outcome(
     right = np.array([r.class_deg for r in results]) == nearest
     errors = np.array([r.expected_size for r in results]) - tubes.size
     holds = np.array([r.holds(x) for r, x in zip(results, tubes.size.tolist(), strict=True)])
-    return Outcome(
-        float(np.mean(right & known)),
-        float(np.mean(~right & known)),
-        float(np.mean(~known)),
-        float(np.sqrt(np.mean(errors[known] ** 2))) if known.any() else float('nan'),
-        float(np.mean(holds[known])) if known.any() else float('nan'),
-    )
+    # Right and wrong by the class nearest to the true size; the size of what was not refused.
+    shares = (100.0 * float(np.mean(each)) for each in (right & known, ~right & known, ~known))
+    line = '{:36s} {:5.1f} % {:5.1f} % {:6.1f} %  '.format(name, *shares)
+    if known.any():
+        rmse = np.rad2deg(np.sqrt(np.mean(errors[known] ** 2)))
+        line += f'{rmse:6.2f} deg  {100.0 * np.mean(holds[known]):6.1f} %'
+    else:
+        line += '     -           -'
+    print(line, flush=True)

@@ -2,7 +2,6 @@
 
 import argparse
 import time
-from dataclasses import dataclass
 
 from endoscope_devices.dynamixel.bus_thread import BusThread
 from endoscope_devices.dynamixel.doctor import bytes_of_cycle, cycles_per_second
@@ -13,37 +12,14 @@ BAUDS = (57_600, 1_000_000, 4_000_000)
 _STEP_S = 1e-3
 
 
-@dataclass(frozen=True)
-class MotorBusFigure:
-    """What one run measured."""
-
-    baud: int  # bits per second
-    cycle_bytes: int  # bytes of a cycle
-    limit: float  # cycles per second that the line carries
-    rate: float  # cycles per second that were run
-    readings: float  # new ones per second; a servo's clock tells milliseconds apart, no less
-    failed: int  # cycles without a valid reading
-
-    def __str__(self) -> str:
-        return (
-            f'{self.baud:>9} {self.cycle_bytes:>7} {self.limit:>11.1f} {self.rate:>11.1f} '
-            f'{100.0 * self.rate / self.limit:>7.1f} % {self.readings:>11.1f} {self.failed:>7}'
-        )
-
-
 def run(args: argparse.Namespace) -> int:
     """Print a line for each speed; return 1 if a cycle failed."""
     print('     baud   bytes  line [1/s]  cycles/s    share  readings/s  failed')
-    failed = 0
-    for baud in BAUDS:
-        figure = run_motor_bus_bench(baud, args.seconds)
-        print(figure, flush=True)
-        failed += figure.failed
-    return 1 if failed else 0
+    return 1 if sum(_failed_cycles(baud, args.seconds) for baud in BAUDS) else 0
 
 
-def run_motor_bus_bench(baud: int, seconds: float) -> MotorBusFigure:
-    """Run two servos as fast as the bus goes."""
+def _failed_cycles(baud: int, seconds: float) -> int:
+    """Run two servos as fast as the bus goes, print, and say how many cycles had no reading."""
     mounts = [ServoMount('motor_x', 1), ServoMount('motor_y', 2)]
     with EmulatorProcess(baud=baud) as emulator:
         bus = BusThread(BusSettings(emulator.port, baud, rate=0.0), mounts)
@@ -65,11 +41,11 @@ def run_motor_bus_bench(baud: int, seconds: float) -> MotorBusFigure:
             failures = sum(bus.figures.failures.values()) - failures
         finally:
             bus.stop()
-    return MotorBusFigure(
-        baud,
-        bytes_of_cycle(len(mounts)),
-        cycles_per_second(baud, len(mounts)),
-        cycles / elapsed,
-        readings / elapsed,
-        failures,
+    limit = cycles_per_second(baud, len(mounts))
+    # A servo's clock tells milliseconds apart, no less: the newest readings are fewer than cycles.
+    print(
+        f'{baud:>9} {bytes_of_cycle(len(mounts)):>7} {limit:>11.1f} {cycles / elapsed:>11.1f} '
+        f'{100.0 * cycles / elapsed / limit:>7.1f} % {readings / elapsed:>11.1f} {failures:>7}',
+        flush=True,
     )
+    return failures

@@ -1,7 +1,6 @@
 """`endoscope bench limits`: how weak an effect may be and still be named."""
 
 import argparse
-from dataclasses import dataclass
 
 from endoscope_benchmarks.bench import require_known, side_by_side, table_row
 from endoscope_benchmarks.concealed.forms import DRAWN
@@ -16,11 +15,7 @@ def run(args: argparse.Namespace) -> int:
     require_known('drawn effect', args.effects or (), DRAWN)
     calls = [(effect, args.seeds) for effect in args.effects or DRAWN]
     for _, future in side_by_side(args.jobs, limit_of, calls):
-        found = future.result()
-        named = f'{100.0 * found.share:.2g} %' if found.share == found.share else 'never'
-        weaker = ', '.join(m or 'nothing' for m in found.missed_as) or '-'
-        numbers = '; '.join(found.numbers)
-        print(table_row(f'`{found.effect}`', named, numbers, weaker), flush=True)
+        print(future.result(), flush=True)
     return 0
 
 
@@ -28,28 +23,18 @@ SHARES = (0.1, 0.032, 0.01, 0.0032, 0.001)
 """Shares of its signal that the effect moves, each about a third of the one before."""
 
 
-@dataclass(frozen=True)
-class Limit:
-    """The weakest strength at which an effect is named."""
-
-    effect: str
-    share: float  # of the signal that it moves most; NaN where it is not named at any
-    numbers: tuple[str, ...]  # of the effect at that strength, one for each rig
-    missed_as: tuple[str, ...]  # what was said where it was weaker; empty for nothing
-
-
-def limit_of(effect: str, seeds: range) -> Limit:
-    """Make an effect weaker until it is not named on each of some rigs, one a seed."""
-    found, numbers = float('nan'), tuple[str, ...]()
+def limit_of(effect: str, seeds: range) -> str:
+    """Make an effect weaker until it is not named on each of some rigs, one a seed; as a row."""
+    named, numbers, missed = 'never', list[str](), list[str]()
     for share in SHARES:
         cases = [case for seed in seeds if (case := _drawn(effect, seed, share)) is not None]
         rows = [row_of(case) for case in cases]
-        missed = tuple('+'.join(row.said) for row in rows if not row.first)
+        missed = ['+'.join(row.said) or 'nothing' for row in rows if not row.first]
         if missed:
-            return Limit(effect, found, numbers, missed)
+            break
         if cases:
-            found, numbers = share, tuple(_in_units(case, effect) for case in cases)
-    return Limit(effect, found, numbers, ())
+            named, numbers = f'{100.0 * share:.2g} %', [_in_units(case, effect) for case in cases]
+    return table_row(f'`{effect}`', named, '; '.join(numbers), ', '.join(missed) or '-')
 
 
 def _drawn(effect: str, seed: int, share: float) -> Case | None:

@@ -10,7 +10,6 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 from endoscope_benchmarks.bench import table_head, table_row
@@ -43,13 +42,10 @@ def run(args: argparse.Namespace) -> int:
     failed = any(map(any, rows.values()))
     if args.minutes > 0.0:
         with busy_loops(2), tempfile.TemporaryDirectory() as folder:
-            row = long_motion(Path(folder), domain, 60.0 * args.minutes)
-        failed |= bool(row.trouble)
-        print(
-            f'{args.minutes:g} min beside Chromium and two loops: {row.trouble or "no fault"}, '
-            f'{row.lost} lost of {row.recorded}, real-time factor {row.factors[0]:.2f} to '
-            f'{row.factors[-1]:.2f}, median {row.factors[len(row.factors) // 2]:.2f}'
-        )
+            trouble, figures = long_motion(Path(folder), domain, 60.0 * args.minutes)
+        failed |= bool(trouble)
+        loops = f'{args.minutes:g} min beside Chromium and two loops'
+        print(f'{loops}: {trouble or "no fault"}, {figures}')
     if args.n:
         print(table_head('session', 'trials', 'every step'))
         for name, troubles in rows.items():
@@ -164,19 +160,8 @@ def _hold_until(hand: Hand, code: str, begun: Callable[[], bool]) -> None:
             return
 
 
-@dataclass(frozen=True)
-class LongMotion:
-    """What became of a motion that was played for long."""
-
-    trouble: str  # the fault that ended it; empty where none did
-    recorded: int  # messages
-    lost: int  # messages
-    # Simulated seconds in a real one, as told each second, in order of size.
-    factors: tuple[float, ...]
-
-
-def long_motion(folder: Path, domain: int, seconds: float) -> LongMotion:
-    """Play a motion for so long, recorded, with the page open in Chromium."""
+def long_motion(folder: Path, domain: int, seconds: float) -> tuple[str, str]:
+    """Play a motion, recorded, with the page open in Chromium; the fault, if any, and figures."""
     factors, trouble = [], ''
     with Relay() as network, ServedConsole(folder, domain, (network.address,)) as console:
         network.target = console.port
@@ -192,5 +177,9 @@ def long_motion(folder: Path, domain: int, seconds: float) -> LongMotion:
                     trouble = f'{client.state}: {client.why}'
             health = client.health['recorder: recording']
             client.ask('disable')
-    recorded = int(float(health.values['messages']))
-    return LongMotion(trouble, recorded, int(float(health.values['lost'])), tuple(sorted(factors)))
+    factors.sort()
+    messages, lost = (int(float(health.values[key])) for key in ('messages', 'lost'))
+    return trouble, (
+        f'{lost} lost of {messages}, real-time factor {factors[0]:.2f} to {factors[-1]:.2f}, '
+        f'median {factors[len(factors) // 2]:.2f}'
+    )

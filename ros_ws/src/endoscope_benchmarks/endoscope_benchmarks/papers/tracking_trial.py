@@ -19,7 +19,12 @@ from endoscope_core.control import (
     bending_range,
 )
 from endoscope_core.control.limits import shipped_limits
-from endoscope_core.dataset import configuration_of_size, random_instrument, record_calibration
+from endoscope_core.dataset import (
+    TubeConfiguration,
+    configuration_of_size,
+    random_instrument,
+    record_calibration,
+)
 from endoscope_core.dataset.rig_variation import GREATEST_UNEVENNESS
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.identification.plant_fit import plants_of_calibration
@@ -110,17 +115,23 @@ class NeverSeenTube:
     noise: int  # seed of the sensors
 
 
+def configuration_of(generator: np.random.Generator, size: float) -> TubeConfiguration:
+    """The first random instrument that has a backlash size in rad, and the tube that gives it."""
+    for _ in range(_MOST_RIGS):
+        unevenness = generator.uniform(-GREATEST_UNEVENNESS, GREATEST_UNEVENNESS)
+        found = configuration_of_size(random_instrument(generator), size, unevenness)
+        if found is not None:
+            return found
+    raise RuntimeError(f'no rig of {_MOST_RIGS} reaches {np.rad2deg(size):.0f} deg')
+
+
 def never_seen_tube(seed: int, number: int, size_deg: float | None = None) -> NeverSeenTube:
     """Draw a rig and how evenly its tube is bent, which gives it a backlash of 42 to 98 deg."""
     generator = np.random.default_rng([_UNSEEN, seed, number])
     drawn = float(generator.uniform(SMALLEST_SIZE_DEG, GREATEST_SIZE_DEG))
     size = np.deg2rad(drawn if size_deg is None else size_deg)
-    for _ in range(_MOST_RIGS):
-        unevenness = float(generator.uniform(-GREATEST_UNEVENNESS, GREATEST_UNEVENNESS))
-        found = configuration_of_size(random_instrument(generator), float(size), unevenness)
-        if found is not None:
-            return NeverSeenTube(found.plant, found.backlash_size, int(generator.integers(2**31)))
-    raise RuntimeError(f'no rig of {_MOST_RIGS} reaches {np.rad2deg(size):.0f} deg')
+    found = configuration_of(generator, float(size))
+    return NeverSeenTube(found.plant, found.backlash_size, int(generator.integers(2**31)))
 
 
 def calibrate(tube: NeverSeenTube, classifier: Classifier) -> CalibrationFindings:
