@@ -108,5 +108,5 @@ def test_every_node_declares_the_parameters_that_are_listed(nodes):
 
 def test_every_node_is_named_as_it_is(nodes):
     named = {name for topic in TOPICS for name in (*topic.said_by, *topic.heard_by)}
-    others = {'every node', 'conductor', 'replay'}
+    others = {'every node', 'conductor', 'recorder', 'replay'}
     assert named - others == set(nodes)

@@ -4,6 +4,7 @@ import json
 import math
 import re
 import signal
+from pathlib import Path
 
 import pytest
 from operated_graph import OperatedGraph
@@ -219,6 +220,21 @@ def test_a_recording_is_begun_and_ended(graph, tmp_path):
     assert (bag / 'metadata.yaml').is_file()
 
 
+def test_a_moment_is_marked_in_words(graph, tmp_path, capsys):
+    assert operate(graph, 'set', 'recorder.bag', str(tmp_path / 'bag'))[0] == 0
+    status, said = operate(graph, 'record', 'mark', 'the wire has slipped')
+    assert status == 0
+    path = Path(said.removeprefix('marked: what led to it goes to '))
+    assert path.parent == tmp_path
+    graph.until((path / 'metadata.yaml').is_file, 'the bag')
+    assert main(['bag', 'list', str(tmp_path)]) == 0
+    assert 'UTC: the wire has slipped' in capsys.readouterr().out
+    status, said = operate(graph, 'record', 'stop')
+    assert (status, said) == (1, 'record stop: not recording')
+    assert main(['operate', 'record', 'stop', 'now']) == 2
+    assert 'record stop takes no text; record mark does' in capsys.readouterr().err
+
+
 def test_status_names_every_node_and_the_source_of_the_master(graph):
     status, out, _ = graph.run('operate', 'status')
     assert status == 0
@@ -271,12 +287,12 @@ def test_topics_are_listed_with_senders_readers_and_what_is_missing(graph):
     rows = {line.split()[0]: line for line in out.splitlines()[1:]}
     assert 'sensor_msgs/msg/JointState' in rows['motor/servo_jp']
     assert 'compensator' in rows['motor/servo_jp']
-    assert 'motor_driver' in rows['motor/servo_jp'].split('compensator')[1]
     assert rows['slave/servo_jp'].endswith('console does not send it now')
     assert rows['master/measured_js'].endswith('no sender outside the graph')
     status, out, _ = graph.run('topics', '--json')
     rows = {row['topic']: row for row in json.loads(out)}
     assert rows['slave/operating_state']['senders'] == ['supervisor']
+    assert {'motor_driver', 'recorder'} <= set(rows['motor/servo_jp']['readers'])
 
 
 def test_a_rate_is_measured_by_the_times_of_receipt(graph):

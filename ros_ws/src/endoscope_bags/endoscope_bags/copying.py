@@ -7,7 +7,7 @@ from endoscope_bags.bag_writer import BagWriter
 from endoscope_bags.errors import BagError
 from endoscope_bags.information import LOST_PREFIX, losses_told
 from endoscope_bags.message_types import MessageType
-from endoscope_bags.recording import Recording, copied_rig_record, open_bag
+from endoscope_bags.recording import Recording, copied_records, open_bag
 from endoscope_bags.sequence_gaps import SequenceGaps
 from endoscope_bags.topic import RawMessage
 from endoscope_core.errors import printable
@@ -48,7 +48,7 @@ def cut(source: str | Path, target: str | Path, begin: float, end: float | None)
     # Of latched topics, the last message before the stretch comes first, as a subscriber who joined
     # then would have heard it; its receipt is the beginning of the stretch.
     in_force: dict[str, RawMessage] = {}
-    with BagWriter(target, records=copied_rig_record(recording)) as writer:
+    with BagWriter(target, records=copied_records(recording)) as writer:
         for topic in recording.topics.values():
             kind = MessageType(topic.type, topic.definition, topic.type_hash)
             writer.add_topic(topic.name, kind, topic.qos)
@@ -99,7 +99,7 @@ class RecoveryReport:
 def recover(source: str | Path, target: str | Path) -> RecoveryReport:
     """Write all messages of the sound chunks of a recording to a new one; on an error to none."""
     recording = open_bag(source, salvage=True)
-    with BagWriter(target, records=copied_rig_record(recording)) as writer:
+    with BagWriter(target, records=copied_records(recording)) as writer:
         _copy(recording, writer)
         writer.close({'recovered_from': Path(source).name, **_numbered(recording.damage)})
         counts = writer.counts

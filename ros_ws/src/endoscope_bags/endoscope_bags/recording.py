@@ -37,6 +37,8 @@ IntArray = npt.NDArray[np.int64]
 Scan = McapScan | Sqlite3Scan
 _NAME, _KEY = 'endoscope_rig', 'rig.yaml'
 """Of the metadata record, which stands before all messages."""
+EVENT_RECORD = 'endoscope_event'
+"""Of the one that says why a bag was kept, of a fault or of an operator's mark."""
 
 
 @contextmanager
@@ -432,9 +434,10 @@ def rig_record(rig: Rig) -> dict[str, dict[str, str]]:
     return {_NAME: {_KEY: rig_as_text(rig)}}
 
 
-def copied_rig_record(recording: Recording) -> dict[str, dict[str, str]]:
-    """The record that a recording has, for another one that is made of it."""
-    return {name: content for name, content in recording.metadata.items() if name == _NAME}
+def copied_records(recording: Recording) -> dict[str, dict[str, str]]:
+    """Records that stand before all messages, for another recording that is made of this one."""
+    kept = (_NAME, EVENT_RECORD)
+    return {name: content for name, content in recording.metadata.items() if name in kept}
 
 
 def rig_of_bag(recording: Recording) -> Rig:

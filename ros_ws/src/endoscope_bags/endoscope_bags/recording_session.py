@@ -1,6 +1,6 @@
 """The recorder without ROS: counts, losses, a full disk, and what is told at the end."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -75,17 +75,30 @@ class _Source:
 class RecordingSession:
     """One recording while it is made; what a kill leaves at `path` can be recovered."""
 
-    def __init__(self, path: str | Path, *, rig: Rig | None = None, threaded: bool = True) -> None:
-        records = {} if rig is None else rig_record(rig)
-        self._writer = BagWriter(path, atomic=False, threaded=threaded, records=records)
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        rig: Rig | None = None,
+        records: Mapping[str, dict[str, str]] | None = None,
+        threaded: bool = True,
+    ) -> None:
+        first = ({} if rig is None else rig_record(rig)) | dict(records or {})
+        self._writer = BagWriter(path, atomic=False, threaded=threaded, records=first)
         self._sources: list[_Source] = []
         self._full = ''
         self._ended = 'on request'
+        self._more_notes: Mapping[str, str] = {}
 
     @property
     def path(self) -> Path:
         """The recording."""
         return self._writer.path
+
+    @property
+    def full(self) -> str:
+        """Why it has ended early; else empty."""
+        return self._full
 
     @property
     def size(self) -> int:
@@ -153,7 +166,7 @@ class RecordingSession:
             self._full = str(error)
 
     def _notes(self) -> dict[str, str]:
-        notes = {'ended': self._full or self._ended}
+        notes = {'ended': self._full or self._ended, **self._more_notes}
         return notes | {
             f'{LOST_PREFIX}{source.topic}': str(source.gaps.lost) for source in self._sources
         }
@@ -167,10 +180,13 @@ class RecordingSession:
             self.path, counts, lost, self._full, self._writer.finished or not self._writer.closed
         )
 
-    def close(self, ended: str = 'on request') -> SessionReport:
+    def close(
+        self, ended: str = 'on request', notes: Mapping[str, str] | None = None
+    ) -> SessionReport:
         """Finish the recording, noting in it why, and say how it went; again is harmless."""
         if not self._writer.closed:
             self._ended = ended
+            self._more_notes = dict(notes or {})
             for source in self._sources:
                 if not source.announced:
                     self._announce(source)

@@ -30,6 +30,7 @@ STATE_COMMAND = 'slave/state_command'
 CONSOLE_LOG = 'console/log'
 SIMULATED_WIRES = 'simulation/wires'
 SIMULATED_BENDING = 'simulation/bending'
+RECORDER_MARK = 'recorder/mark'
 RIG_KIND = 'rig/kind'
 ROBOT_DESCRIPTION = 'robot_description'
 ROBOT_DESCRIPTION_OF_ALL = '/robot_description'
@@ -51,5 +52,7 @@ FACTOR = 'real-time factor'
 # :class:`endoscope_core.safety.Answer` and in words, and when; and which streams never came.
 REFUSAL, REFUSAL_CODE, REFUSED_NS = 'last refusal', 'refusal code', 'refused at [ns]'
 AWAITED = 'awaited'
+# What `recorder: events` says there: how many marks it has heard, and its last bag of an event.
+MARKS, LAST_EVENT = 'marks', 'last bag'
 # What `console: commands` says there of a motion that it plays.
 FINISHED = 'finished'

@@ -298,6 +298,16 @@ TOPICS = (
         asked=EVENT,
     ),
     Topic(
+        names.RECORDER_MARK,
+        'std_msgs/msg/String',
+        'when somebody asks',
+        'an operator marks this moment, in words or with an empty text: the recorder writes what '
+        'came before and the 2 s after as a bag',
+        offered=None,
+        asked=EVENT,
+        heard_by=('recorder',),
+    ),
+    Topic(
         names.SIMULATED_WIRES,
         _JOINT_STATE,
         _STREAM,

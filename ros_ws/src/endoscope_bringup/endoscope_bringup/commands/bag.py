@@ -1,4 +1,4 @@
-"""`endoscope bag`: what is in a recording, a stretch of it, and saving a damaged one."""
+"""`endoscope bag`: which recordings there are, what is in one, a stretch of it, saving one."""
 
 import argparse
 from pathlib import Path
@@ -7,9 +7,19 @@ from endoscope_bringup.subcommands import add_json_option, print_json, within
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
-    """Add `bag` with `info`, `cut` and `recover`."""
+    """Add `bag` with `list`, `info`, `cut` and `recover`."""
     parser = subparsers.add_parser('bag', help='look into a recording, cut it, save a damaged one')
     actions = parser.add_subparsers(dest='action', metavar='ACTION', required=True)
+    listed = actions.add_parser(
+        'list',
+        help='the recordings in a folder, with the faults and marks that were kept',
+        description='Lists the recordings in FOLDER, oldest first: what they are, when they begin '
+        'and how long they are, and of those that were kept for a fault or a mark when and why.',
+    )
+    listed.add_argument(
+        'folder', metavar='FOLDER', type=Path, nargs='?', default=Path('bags'), help='(bags)'
+    )
+    add_json_option(listed)
     info = actions.add_parser(
         'info',
         help='topics, counts, rates, duration, pauses, gaps and losses',
@@ -55,7 +65,15 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print what was found or written; return 0."""
-    if args.action == 'info':
+    if args.action == 'list':
+        from endoscope_bags.listing import bags_in, listing
+
+        entries = bags_in(args.folder)
+        if args.json:
+            print_json([entry.as_json() for entry in entries])
+        else:
+            print(listing(args.folder, entries))
+    elif args.action == 'info':
         from endoscope_bags import open_bag
         from endoscope_bags.information import bag_information
 

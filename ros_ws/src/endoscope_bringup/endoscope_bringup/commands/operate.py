@@ -22,7 +22,8 @@ _ACTIONS = {
     'reboot': 'restart the servos without torque; not while the slave is ENABLED',
     'set': 'give a node a new value of a parameter',
     'get': "print a parameter's value, or all parameters of a node with values and ranges",
-    'record': 'begin or end a recording',
+    'record': 'begin or end a recording; or mark this moment, with TEXT: what came before and the '
+    '2 s after become a bag',
 }
 _INTERRUPTED = (
     'Ctrl-C, SIGTERM or a terminal that is closed pauses the graph: the slave holds where it is, '
@@ -69,7 +70,10 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
                 'value', metavar='VALUE', help='of its type: true, 0.5, physical, [bend_x, bend_y]'
             )
         if name == 'record':
-            action.add_argument('what', choices=('start', 'stop'))
+            action.add_argument('what', choices=('start', 'stop', 'mark'))
+            action.add_argument(
+                'text', metavar='TEXT', nargs='?', default='', help='why this moment is marked'
+            )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -79,10 +83,12 @@ def run(args: argparse.Namespace) -> int:
     from functools import partial
 
     from endoscope_bringup.operating.actions import act, paused_when_interrupted
-    from endoscope_core.errors import printable
+    from endoscope_core.errors import InputError, printable
     from endoscope_nodes.client.graph_client import joined_graph
     from endoscope_nodes.client.graph_listener import GraphError
 
+    if getattr(args, 'text', '') and args.what != 'mark':
+        raise InputError(f'record {args.what} takes no text; record mark does')
     name = ' '.join(filter(None, (args.action, getattr(args, 'what', ''))))
     try:
         with (

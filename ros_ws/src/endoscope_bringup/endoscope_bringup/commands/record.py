@@ -39,7 +39,8 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_nodes.nodes.recorder import RecorderNode, new_bag
     from endoscope_nodes.runtime.runtime import run_nodes
 
-    parameters = {'bag': args.out or new_bag(), 'use_sim_time': args.sim_time}
+    # The bags of faults are written by the recorder of the graph.
+    parameters = {'bag': args.out or new_bag(), 'use_sim_time': args.sim_time, 'keep': 0.0}
     if args.topics:
         parameters['topics'] = args.topics
     return run_nodes([RecorderNode], ros_arguments(parameters, args.namespace))

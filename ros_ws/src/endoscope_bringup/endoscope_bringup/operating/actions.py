@@ -45,8 +45,11 @@ def act(client: GraphClient, args: argparse.Namespace) -> Reply:
     if action == 'set':
         return _set(client, args.parameter, args.value, patience_s)
     if action == 'record':
-        service = names.RECORDER_START if args.what == 'start' else names.RECORDER_STOP
         client.find(patience_s)
+        if args.what == 'mark':
+            bag = client.mark(args.text, patience_s)
+            return Reply((f'marked: what led to it goes to {bag}',), {'bag': bag})
+        service = names.RECORDER_START if args.what == 'start' else names.RECORDER_STOP
         said = client.trigger(service, patience_s)
         return Reply((f'recording to {said}' if args.what == 'start' else said,))
     client.find(patience_s)

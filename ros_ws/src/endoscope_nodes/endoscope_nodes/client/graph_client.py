@@ -15,6 +15,7 @@ from std_srvs.srv import Trigger
 from endoscope_core.safety.operating_state import CAUSES_PRESENT
 from endoscope_nodes import names
 from endoscope_nodes.client.graph_listener import (
+    EVENTS,
     PATIENCE_S,
     SUPERVISOR,
     GraphError,
@@ -153,6 +154,30 @@ class GraphClient(GraphListener):
             return False
         self.told(f'waits until the graph is whole: {refused}')
         return self.wait_until(lambda: not self.awaited, WHOLE_S)
+
+    def mark(self, text: str, patience_s: float = PATIENCE_S) -> str:
+        """Mark this moment for the recorder; the bag that what came before goes to."""
+        self.wait_for(lambda: EVENTS in self.health, 'the recorder', patience_s)
+        marks = self.node.create_publisher(String, names.RECORDER_MARK, EVENT)
+        try:
+            self.wait_for(
+                lambda: marks.get_subscription_count() > 0,
+                'a recorder that keeps what came before',
+                patience_s,
+            )
+            before = self.health[EVENTS].values[names.MARKS]
+            marks.publish(String(data=text))
+            self.wait_for(
+                lambda: self.health[EVENTS].values[names.MARKS] != before,
+                "the recorder's answer",
+                patience_s,
+            )
+        finally:
+            self.node.destroy_publisher(marks)
+        said = self.health[EVENTS]
+        if said.level:
+            raise GraphError(said.message)
+        return said.values[names.LAST_EVENT]
 
     def home(self, patience_s: float = PATIENCE_S, withdrawn: Callable[[], bool] = _never) -> str:
         """Go home, and wait until the slave is there; what calibration says of it."""

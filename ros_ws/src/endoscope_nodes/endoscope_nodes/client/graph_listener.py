@@ -24,6 +24,7 @@ PATIENCE_S = 20.0
 POLL_S = 0.05
 SUPERVISOR = 'supervisor: operating state'
 RECORDER = 'recorder: recording'
+EVENTS = 'recorder: events'
 MASTER = f'{names.MASTER_NODE}: commands'
 LOCK_STEP = f'{names.CLOCK_NODE}: lock-step'
 COMMANDS = ('compensator: commands', 'compensator: calibration commands', 'motor_driver: commands')

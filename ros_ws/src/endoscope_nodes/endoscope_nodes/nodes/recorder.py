@@ -1,34 +1,53 @@
-"""Records topics into a bag: every message as it came, counted, with what was lost."""
+"""Records topics into a bag: every message as it came, counted, with what was lost.
+
+The last seconds are kept in memory all the time, for the bag of a fault or of an operator's mark.
+"""
 
 import itertools
 import math
 import struct
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import InvalidTopicNameException
+from rclpy.qos import DurabilityPolicy
+from rclpy.serialization import deserialize_message
 from rclpy.validate_topic_name import validate_topic_name
 from std_msgs.msg import String
 
 from endoscope_bags.errors import BagError, UnknownTypeError
+from endoscope_bags.event_bag import FAULT, MARK, EventBag, held_since, new_event_bag
 from endoscope_bags.message_types import begins_with_header, message_type
+from endoscope_bags.recent_messages import RecentMessages, packed
 from endoscope_bags.recording_session import (
     Arrival,
     RecordingSession,
     SessionReport,
     simulated_receipt_ns,
 )
+from endoscope_bags.topic import QosProfile
 from endoscope_core.atomic_output import with_final_names
 from endoscope_core.errors import nearest
-from endoscope_nodes.names import OPERATING_STATE, RECORDER_START, RECORDER_STOP
+from endoscope_nodes.names import (
+    DIAGNOSTICS,
+    LAST_EVENT,
+    MARKS,
+    MOTION_SESSION,
+    OPERATING_STATE,
+    RECORDER_MARK,
+    RECORDER_START,
+    RECORDER_STOP,
+)
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
 from endoscope_nodes.runtime.node_parameters import RecorderParameters
 from endoscope_nodes.runtime.parameters import ParameterError
-from endoscope_nodes.runtime.qos import RESULT
+from endoscope_nodes.runtime.qos import EVENT, RESULT
 from endoscope_nodes.runtime.recorded_topics import (
     message_class,
     offered_profiles,
@@ -42,17 +61,24 @@ _SECOND = 1_000_000_000
 _LOOK_PERIOD_S = 0.1
 _UNTYPED_S = 2.0
 _MEGABYTE = 1_000_000
+_AFTER_NS = 2 * _SECOND
+"""How long the bag of an event goes on after the last of its events."""
+_REASON_NS = 1_500_000_000
+"""How long the reason of a fault, which the supervisor tells every second, is waited for."""
+_STATE_OF_SUPERVISOR = 'supervisor: operating state'
 
 
 @dataclass
 class _Source:
     name: str
+    type_name: str
     kind: type
     latched: bool
     has_stamp: bool
     subscription: RawSubscription
     number: int
     publishers_seen: int = -1
+    offered: tuple[QosProfile, ...] = ()
 
     def count_publishers(self) -> int:
         # The subscription may be replaced by another one.
@@ -70,6 +96,10 @@ class RecorderNode(EndoscopeNode):
     A recording that nobody asked for or named ends once the slave has rested, and the next motion
     session begins another one, until all of them have taken the rig's ``recording.room``. Whoever
     calls ``recorder/start`` or ``recorder/stop`` decides alone from then on.
+
+    What came in the last seconds is kept in memory whether or not it is recorded. When the slave
+    goes to ``FAULT``, or ``recorder/mark`` says something, it and what follows becomes a bag of its
+    own. Every bag begins with what was in force: latched topics and the motion session.
     """
 
     def __init__(self, context: NodeContext) -> None:
@@ -78,12 +108,23 @@ class RecorderNode(EndoscopeNode):
         p = self.parameters(RecorderParameters, self._on_parameters)
         self._bag = p.bag
         self._topics = checked_names(p.topics)
+        self._recent = RecentMessages(p.keep, p.keep_room * _MEGABYTE)
+        self._keeps = p.keep > 0.0
+        self._most_events = p.keep_bags
+        self._event: EventBag | None = None
+        self._event_ends_ns = 0
+        self._event_begins_ns = 0
+        self._event_trouble = ''
+        self._marks = 0
+        self._last_event = ''
+        self._state = ''
+        self._holding: set[int] = set()
         self._asked_for = p.topics != RecorderParameters().topics
         self._said_untyped_s = 0.0
         self._session: RecordingSession | None = None
         self._sources: list[_Source] = []
         self._to_look_at: list[_Source] = []
-        self._untyped: list[str] = []
+        self._untyped = list(self._topics)
         self._last_tick_ns = 0
         self._said_loss = 0
         self._unasked = p.autostart and not p.bag and self.rig.recording.room > 0
@@ -102,9 +143,14 @@ class RecorderNode(EndoscopeNode):
             _LOOK_PERIOD_S, self._look_around, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
         self.diagnostics.add('recording', self._report)
+        self.diagnostics.add('events', self._report_events)
         if self._unasked:
-            self.create_subscription(String, OPERATING_STATE, self._on_state, RESULT)
             self.ticker.every(1.0, self._end_unasked)
+        if self._unasked or self._keeps:
+            self.create_subscription(String, OPERATING_STATE, self._on_state, RESULT)
+        if self._keeps:
+            self.create_subscription(String, RECORDER_MARK, self._on_mark, EVENT)
+        self._subscribe_untyped()
         if p.autostart and (p.bag or self._unasked):
             try:
                 self.start()
@@ -125,11 +171,13 @@ class RecorderNode(EndoscopeNode):
             there = with_final_names(str(self._session.path))
             raise BagError(f'already recording to {there}; stop that first')
         path = Path(new_bag() if self._unasked else self._bag or new_bag())
-        self._session = RecordingSession(path, rig=self.rig)
+        now_ns = self.ticker.now_ns()
+        # What came before is no part of it, but what is in force.
+        self._collect(now_ns)
+        self._session = self._new_session(path)
+        self._session.accept(held_since(self._recent.in_force, now_ns))
         self._said_loss = 0
-        self._untyped = list(self._topics)
         self._said_untyped_s = time.monotonic() + _UNTYPED_S
-        self._subscribe_untyped()
         self.get_logger().info(f'recording to {with_final_names(str(path))}')
         return path
 
@@ -139,9 +187,6 @@ class RecorderNode(EndoscopeNode):
             raise BagError('not recording')
         self._collect(self.ticker.now_ns())
         session, self._session = self._session, None
-        sources, self._sources, self._to_look_at = self._sources, [], []
-        for source in sources:
-            source.subscription.close()
         report = self.last_report = session.close(ended)
         silent = [topic for topic, count in report.counts.items() if not count] + self._untyped
         if silent and (self._asked_for or not report.message_count):
@@ -158,9 +203,15 @@ class RecorderNode(EndoscopeNode):
         return [(source.name, source.count_publishers()) for source in self._sources]
 
     def close(self) -> None:
-        """Finish a recording that is being made."""
+        """Finish what is being written."""
         if self._session is not None:
             self.stop()
+        if self._event is not None:
+            self._collect(self.ticker.now_ns())
+            self._end_event()
+        for source in self._sources:
+            source.subscription.close()
+        self._sources = []
 
     def start_as_asked(self) -> tuple[bool, str]:
         """Begin a recording that is the asker's; whether it has begun, and where or why not."""
@@ -180,6 +231,9 @@ class RecorderNode(EndoscopeNode):
         return report.complete, str(report)
 
     def _on_state(self, message: String) -> None:
+        before, self._state = self._state, message.data
+        if self._keeps and before and before != self._state == 'FAULT':
+            self._on_event(FAULT)
         enabled = message.data == 'ENABLED'
         if enabled or not self._active_ns:
             self._active_ns = self.ticker.monotonic_ns()
@@ -235,40 +289,66 @@ class RecorderNode(EndoscopeNode):
             self._untyped.append(topic)
 
     def _add_source(self, topic: str, type_name: str, latched: bool) -> None:
-        assert self._session is not None
         full = self.resolve_topic_name(topic)
         kind = message_class(type_name)
         has_stamp = begins_with_header(message_type(type_name).definition)
-        qos = suitable_qos(latched, self.get_publishers_info_by_topic(full))
+        publishers = self.get_publishers_info_by_topic(full)
+        qos = suitable_qos(latched, publishers)
         subscription = RawSubscription(self, kind, topic, qos)
-        source = _Source(full, kind, latched, has_stamp, subscription, 0)
-        source.number = self._session.add_topic(
-            full,
-            type_name,
-            lambda: offered_profiles(self.get_publishers_info_by_topic(full)),
-            source.count_publishers,
-        )
+        number = len(self._sources)
+        source = _Source(full, type_name, kind, latched, has_stamp, subscription, number)
+        source.offered = offered_profiles(publishers)
         self._sources.append(source)
+        self._note_whether_it_holds(source)
+        for session in (self._session, self._event.session if self._event else None):
+            if session is not None:
+                self._announce(source, session)
+
+    def _announce(self, source: _Source, session: RecordingSession) -> None:
+        number = session.add_topic(
+            source.name, source.type_name, lambda: self._offered(source), source.count_publishers
+        )
+        assert number == source.number
+
+    def _offered(self, source: _Source) -> tuple[QosProfile, ...]:
+        # To ask for it costs a tick: what was heard of these publishers before is as good.
+        if not source.offered or source.count_publishers() != source.publishers_seen:
+            source.offered = offered_profiles(self.get_publishers_info_by_topic(source.name))
+        return source.offered
+
+    def _new_session(
+        self, path: Path, records: Mapping[str, dict[str, str]] | None = None
+    ) -> RecordingSession:
+        session = RecordingSession(path, rig=self.rig, records=records)
+        for source in self._sources:
+            self._announce(source, session)
+        return session
+
+    def _note_whether_it_holds(self, source: _Source) -> None:
+        """Note topics whose last message holds until the next one: bags begin with these."""
+        latched = source.subscription.qos.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        if latched or source.name == self.resolve_topic_name(MOTION_SESSION):
+            self._holding.add(source.number)
+        else:
+            self._holding.discard(source.number)
 
     def _look_around(self) -> None:
         """Adapt one topic to its publishers; after the last one see what else there is."""
-        session = self._session
-        if session is None:
-            return
         # One at a time, because the graph's answer for all of them would cost a tick.
         if self._to_look_at:
             self._adapt(self._to_look_at.pop())
             return
         self._subscribe_untyped()
-        if self._untyped and time.monotonic() > self._said_untyped_s:
+        session = self._session
+        if session is not None and self._untyped and time.monotonic() > self._said_untyped_s:
             self._said_untyped_s = math.inf
             there = [name for name, _ in self.get_topic_names_and_types()]
             for topic in self._untyped:
                 full = self.resolve_topic_name(topic)
                 self.get_logger().warning(f'nobody publishes {full}: {nearest(full, there)}')
         self._to_look_at = list(self._sources)
-        report = session.report()
-        if report.lost_count > self._said_loss:
+        report = session.report() if session is not None else None
+        if report is not None and report.lost_count > self._said_loss:
             self._said_loss = report.lost_count
             self.get_logger().error(str(report))
 
@@ -279,6 +359,7 @@ class RecorderNode(EndoscopeNode):
             return
         source.publishers_seen = count
         publishers = self.get_publishers_info_by_topic(source.name)
+        source.offered = offered_profiles(publishers)
         qos = suitable_qos(source.latched, publishers)
         if publishers and (qos.durability, qos.reliability) != (
             source.subscription.qos.durability,
@@ -287,6 +368,7 @@ class RecorderNode(EndoscopeNode):
             self._collect(self.ticker.now_ns())
             source.subscription.close()
             source.subscription = RawSubscription(self, source.kind, source.name, qos)
+            self._note_whether_it_holds(source)
 
     def _on_tick(self, stamp_ns: int, periods: int) -> None:
         self._collect(stamp_ns)
@@ -296,10 +378,9 @@ class RecorderNode(EndoscopeNode):
         self._collect(self.ticker.now_ns())
 
     def _collect(self, now_ns: int) -> None:
-        session = self._session
-        if session is None or now_ns == 0:
+        if now_ns == 0:
             return
-        arrivals = []
+        session, arrivals = self._session, []
         simulated = self.ticker.simulated
         for source in self._sources:
             number = source.number
@@ -315,10 +396,105 @@ class RecorderNode(EndoscopeNode):
                 arrivals.append(
                     Arrival(received, number, info['publication_sequence_number'], published, data)
                 )
-        if arrivals:
-            session.accept(arrivals)
-        if not simulated:
-            session.flush_stale(now_ns)
+        self._recent.add(arrivals, self._holding, now_ns)
+        if session is not None:
+            if arrivals:
+                session.accept(arrivals)
+            if not simulated:
+                session.flush_stale(now_ns)
+        if self._event is not None:
+            self._go_on_with(self._event, arrivals)
+
+    def _on_mark(self, message: String) -> None:
+        self._marks += 1
+        self._on_event(MARK, message.data.strip() or 'by the operator')
+        # Whoever asked waits for the answer.
+        self.diagnostics.publish()
+
+    def _on_event(self, kind: str, reason: str = '') -> None:
+        """Keep what came before in a bag, or note one more event of the bag that is written."""
+        now_ns, steady_ns = self.ticker.now_ns(), self.ticker.monotonic_ns()
+        if not now_ns:
+            return
+        self._event_ends_ns = steady_ns + _AFTER_NS
+        self._event_begins_ns = steady_ns + _REASON_NS
+        if self._event is not None:
+            self._event.add(kind, now_ns, reason)
+            return
+        self._collect(now_ns)
+        self._event = EventBag(self._recent, kind, now_ns, reason)
+        if reason:
+            self._begin_event(self._event)
+
+    def _begin_event(self, event: EventBag) -> None:
+        folder = Path(self._bag or new_bag()).parent
+        try:
+            path = new_event_bag(folder, event.kind, self._most_events)
+            event.begin(lambda records: self._new_session(path, records))
+        except BagError as error:
+            self._event = None
+            self._say_event_trouble(f'no bag of the {event.events[0]}: {error}')
+            return
+        self._event_trouble, self._last_event = '', str(path)
+        self.get_logger().info(f'{event.events[0]}: what led to it goes to {path}')
+
+    def _say_event_trouble(self, what: str) -> None:
+        self._event_trouble = what
+        self.exit_code = 1
+        self.get_logger().error(what)
+        self.diagnostics.publish()
+
+    def _go_on_with(self, event: EventBag, arrivals: list[Arrival]) -> None:
+        steady_ns = self.ticker.monotonic_ns()
+        if event.lacks_reason:
+            self._look_for_reason(event, arrivals)
+        event.arrive(packed(arrivals), len(arrivals))
+        if event.session is None:
+            if not event.lacks_reason or steady_ns >= self._event_begins_ns:
+                self._begin_event(event)
+            return
+        if event.session.full or (steady_ns >= self._event_ends_ns and event.caught_up):
+            self._end_event()
+
+    def _look_for_reason(self, event: EventBag, arrivals: list[Arrival]) -> None:
+        wanted = f'{self.get_namespace().rstrip("/")}/{_STATE_OF_SUPERVISOR}'
+        for arrival in arrivals:
+            if self._sources[arrival.topic].name != DIAGNOSTICS:
+                continue
+            told: DiagnosticArray = deserialize_message(arrival.data, DiagnosticArray)
+            for status in (s for s in told.status if s.name == wanted):
+                cause = {v.key: v.value for v in status.values}.get('cause', '')
+                if cause:
+                    event.explain(cause)
+
+    def _end_event(self) -> None:
+        event, self._event = self._event, None
+        if event is None:
+            return
+        if event.session is None:
+            self._begin_event(event)
+            # It is begun to be ended at once, where the node ends.
+            self._event = None
+        if event.session is None:
+            return
+        report = event.close()
+        if report.full or not report.finished:
+            self._say_event_trouble(f'the bag of the {event.events[0]}: {report}')
+        else:
+            self.get_logger().info(str(report))
+
+    def _report_events(self) -> Report:
+        values: dict[str, object] = {
+            'kept [s]': self._recent.seconds,
+            'kept [MB]': self._recent.size / _MEGABYTE,
+            MARKS: self._marks,
+            LAST_EVENT: self._last_event,
+        }
+        if self._event_trouble:
+            return ERROR, self._event_trouble, values
+        if not self._keeps:
+            return OK, 'keeps nothing for bags of faults and marks', values
+        return OK, 'writing' if self._event else 'keeping the last seconds', values
 
     def _report(self) -> Report:
         if self._session is None:

@@ -305,6 +305,20 @@ class RecorderParameters:
         RECORDED, 'topics to record, relative ones in the namespace of the node'
     )
     autostart: bool = parameter(True, 'record from the start instead of on recorder/start')
+    keep: float = parameter(
+        20.0,
+        'what came last is kept in memory for so long, for the bag of a fault or a mark; 0 for '
+        'none of these',
+        unit='s',
+        low=0.0,
+        high=600.0,
+    )
+    keep_room: int = parameter(40, 'memory for that; 10^6 bytes', unit='MB', low=1, high=4000)
+    keep_bags: int = parameter(
+        50,
+        'bags of faults and marks in a folder, beyond which no more are written; none is deleted',
+        low=1,
+    )
     drain_period: float = parameter(
         0.002, 'how often the queues are emptied', unit='s', low=0.0005, high=0.1
     )

@@ -1,0 +1,92 @@
+"""Which recordings are in a folder: `endoscope bag list`."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from endoscope_bags.errors import BagError, BagNotFoundError
+from endoscope_bags.event_bag import Event, events_of
+from endoscope_bags.metadata import bag_files
+from endoscope_bags.recording import open_bag
+from endoscope_core.errors import EndoscopeError, printable
+
+RECORDING = 'recording'
+_SUFFIXES = ('.mcap', '.db3')
+
+
+@dataclass(frozen=True)
+class BagEntry:
+    """One recording of a folder."""
+
+    name: str  # of its folder or file
+    kind: str  # of its first event, `fault` or `mark`; else `recording`
+    start_ns: int  # first receipt, since the epoch; 0 where it cannot be read
+    duration_s: float
+    size: int  # bytes
+    events: tuple[Event, ...]  # why it was kept
+    trouble: str  # why it cannot be read, or what is damaged; else empty
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return {**vars(self), 'events': [vars(event) for event in self.events]}
+
+    def lines(self) -> list[str]:
+        """Say it: one line, and one for each event or trouble."""
+        begin = f'{np.datetime64(self.start_ns, "s")}Z' if self.start_ns else '-'
+        size = f'{self.duration_s:10.3f} s  {self.size / 1e6:9.2f} MB'
+        told = [f'{self.kind:9}  {begin:20}  {size}  {self.name}']
+        told += [f'    {event}' for event in self.events]
+        return told + ([f'    {self.trouble}'] if self.trouble else [])
+
+
+def bags_in(folder: Path) -> list[BagEntry]:
+    """Look into all recordings of a folder, oldest first.
+
+    BagNotFoundError if there is no such folder; a recording that cannot be read is listed with why.
+    """
+    if not folder.is_dir():
+        raise BagNotFoundError(f'{folder}: no such folder')
+    entries = [_entry(path) for path in sorted(folder.iterdir()) if _is_bag(path)]
+    return sorted(entries, key=lambda entry: entry.start_ns)
+
+
+def _is_bag(path: Path) -> bool:
+    if path.name.startswith('.'):
+        return False
+    if path.is_dir():
+        return any(file.suffix in _SUFFIXES for file in path.iterdir())
+    return path.suffix in _SUFFIXES
+
+
+def _entry(path: Path) -> BagEntry:
+    trouble = ''
+    try:
+        size = sum(file.stat().st_size for file in bag_files(path))
+        try:
+            recording = open_bag(path)
+        except BagError as error:
+            # A recorder that was killed has left a reason, and what came before it.
+            trouble = str(error)
+            recording = open_bag(path, salvage=True)
+    except (EndoscopeError, OSError) as error:
+        return BagEntry(path.name, RECORDING, 0, 0.0, 0, (), str(error))
+    events = tuple(events_of(recording.metadata))
+    return BagEntry(
+        path.name,
+        events[0].kind if events else RECORDING,
+        recording.start_ns,
+        (recording.end_ns - recording.start_ns) * 1e-9,
+        size,
+        events,
+        trouble,
+    )
+
+
+def listing(folder: Path, entries: Sequence[BagEntry]) -> str:
+    """Return the entries as text."""
+    if not entries:
+        return printable(f'{folder}: no recording')
+    return '\n'.join(printable(line) for entry in entries for line in entry.lines())

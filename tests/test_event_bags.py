@@ -1,0 +1,251 @@
+"""The recorder keeps what led to a fault or a mark, though nobody records."""
+
+import json
+import resource
+import time
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from recorded_session import DIAGNOSTICS, SERVO, STATE, RecordedSession
+from rosbags.highlevel import AnyReader
+from sensor_msgs.msg import JointState
+from simulated_graph import SimulatedGraph
+from std_msgs.msg import Header, String
+
+from endoscope_bags import open_bag
+from endoscope_bags.cdr_encoding import encode_joint_state
+from endoscope_bags.event_bag import event_bags, events_of
+from endoscope_bags.rig_kind import kind_of_bag
+from endoscope_bringup.cli import main
+from endoscope_core.rig import Kind
+from endoscope_nodes.names import MOTION_SESSION, MOTOR_MEASURED, RECORDER_MARK
+from endoscope_nodes.nodes.instrument_model import InstrumentModelNode
+from endoscope_nodes.nodes.recorder import RecorderNode
+from endoscope_nodes.runtime.diagnostics import ERROR, OK
+from endoscope_nodes.runtime.qos import EVENT, RESULT, SENSOR_OFFERED
+
+CAUSE = 'tension of wire_x_pos is 41.2 N'
+TOPICS = [SERVO, STATE, DIAGNOSTICS, f'/endoscope/{MOTION_SESSION}', f'/endoscope/{RECORDER_MARK}']
+
+
+class WatchedSession(RecordedSession):
+    """A recorder that records nothing, a stream it hears, and a supervisor's words."""
+
+    def __init__(self, folder, **parameters):
+        given = {'bag': str(folder / 'bag'), 'autostart': False, 'topics': TOPICS}
+        super().__init__(**given | parameters)
+        self.folder = folder
+        self.sent = 0
+        self.servo = self.publisher(JointState, SERVO, SENSOR_OFFERED)
+        self.state = self.publisher(String, STATE, RESULT)
+        self.health = self.publisher(DiagnosticArray, DIAGNOSTICS, EVENT)
+        self.session = self.publisher(Header, f'/endoscope/{MOTION_SESSION}', EVENT)
+        self.marks = self.publisher(String, f'/endoscope/{RECORDER_MARK}', EVENT)
+        self.probe.create_timer(0.002, self._stream)
+
+    def _stream(self):
+        stamp = time.time_ns()
+        self.servo.publish(encode_joint_state(['motor_x'], stamp, position=[float(self.sent)]))
+        self.sent += 1
+
+    def say(self, state):
+        self.state.publish(String(data=state))
+        self.wait(lambda: self.recorder._state == state)
+
+    def fault(self, cause=CAUSE):
+        self.say('ENABLED')
+        self.say('FAULT')
+        if cause:
+            values = [KeyValue(key='cause', value=cause)]
+            name = '/endoscope/supervisor: operating state'
+            status = DiagnosticStatus(name=name, level=ERROR, message=cause, values=values)
+            self.health.publish(DiagnosticArray(status=[status]))
+
+    def kept(self):
+        self.wait(lambda: self.recorder._event is not None)
+        self.wait(lambda: self.recorder._event is None)
+        return event_bags(self.folder)
+
+    def said(self):
+        level, message, _ = self.recorder._report_events()
+        return level, message
+
+
+def test_a_fault_is_kept_with_what_came_before_and_its_reason(tmp_path):
+    with WatchedSession(tmp_path) as session:
+        session.session.publish(Header(frame_id='session-17'))
+        session.serve(1.0)
+        session.fault()
+        before = session.sent
+        [path] = session.kept()
+        # It lasts, and is told again and again: no second one.
+        for _ in range(5):
+            session.say('FAULT')
+            session.serve(0.05)
+        assert event_bags(tmp_path) == [path]
+        assert session.said()[0] == OK
+    assert session.runtime.exit_code == 0
+    assert path.name.startswith('fault-')
+    bag = open_bag(path)
+    [event] = events_of(bag.metadata)
+    assert (event.kind, event.reason) == ('fault', CAUSE)
+    series = bag.joint_state('motor/servo_jp')
+    assert series.position[:, 0].tolist() == list(range(len(series)))
+    assert len(series) > before
+    assert series.log_ns[-1] - event.at_ns >= 1.9e9
+    # Nothing came from a recording: nobody has begun one.
+    assert not (tmp_path / 'bag').exists()
+    with AnyReader([path]) as reader:
+        assert {c.topic: c.msgcount for c in reader.connections}[SERVO] == len(series)
+
+
+def test_a_fault_whose_reason_nobody_tells_is_kept_all_the_same(tmp_path):
+    with WatchedSession(tmp_path) as session:
+        session.fault(cause='')
+        [path] = session.kept()
+    [event] = events_of(open_bag(path).metadata)
+    assert (event.kind, event.reason) == ('fault', '')
+
+
+def test_a_mark_while_a_fault_is_written_is_noted_in_the_same_bag(tmp_path):
+    with WatchedSession(tmp_path) as session:
+        session.fault()
+        session.wait(lambda: session.recorder._event.session)
+        session.serve(1.0)
+        session.marks.publish(String(data='  the wire has slipped '))
+        [path] = session.kept()
+    bag = open_bag(path)
+    assert [(e.kind, e.reason) for e in events_of(bag.metadata)] == [
+        ('fault', CAUSE),
+        ('mark', 'the wire has slipped'),
+    ]
+    assert bag.end_ns - events_of(bag.metadata)[1].at_ns >= 1.9e9
+
+
+def test_a_recording_goes_on_beside_it_and_loses_nothing(tmp_path):
+    with WatchedSession(tmp_path) as session:
+        session.serve(0.5)
+        session.recorder.start()
+        first = session.sent
+        session.fault()
+        session.kept()
+        report = session.recorder.stop()
+    assert report.complete, report
+    series = open_bag(tmp_path / 'bag').joint_state('motor/servo_jp')
+    numbers = series.position[:, 0].tolist()
+    assert numbers == [numbers[0] + k for k in range(len(numbers))]
+    assert numbers[0] >= first - 2
+
+
+def test_a_node_that_ends_finishes_what_it_writes(tmp_path):
+    with WatchedSession(tmp_path) as session:
+        session.serve(0.5)
+        session.marks.publish(String())
+        session.wait(lambda: session.recorder._event is not None)
+    [path] = event_bags(tmp_path)
+    bag = open_bag(path)
+    assert [(e.kind, e.reason) for e in events_of(bag.metadata)] == [('mark', 'by the operator')]
+    assert bag.topics[SERVO].message_count > 100
+
+
+def test_no_more_than_allowed_are_written_and_that_is_said(tmp_path):
+    with WatchedSession(tmp_path, keep_bags=1) as session:
+        session.fault()
+        [path] = session.kept()
+        session.fault()
+        session.wait(lambda: session.said()[0] == ERROR)
+        assert 'has 1 bags of faults and marks already: read them' in session.said()[1]
+        assert event_bags(tmp_path) == [path]
+        path.rename(tmp_path / 'read')
+        session.fault()
+        session.kept()
+        assert session.said()[0] == OK
+
+
+def test_a_full_disk_is_said_once_and_the_node_goes_on(tmp_path):
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    with WatchedSession(tmp_path) as session:
+        session.serve(1.0)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, hard))
+        try:
+            session.fault()
+            session.kept()
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        level, message = session.said()
+        assert level == ERROR
+        assert 'File too large; recording ended there' in message
+        assert CAUSE in message
+        # The next one has room again.
+        session.fault('motor_driver: device: overload')
+        session.kept()
+        assert session.said()[0] == OK
+    first, second = event_bags(tmp_path)
+    assert [e.reason for e in events_of(open_bag(first).metadata)] == [CAUSE]
+    assert [e.reason for e in events_of(open_bag(second).metadata)] == [
+        'motor_driver: device: overload'
+    ]
+
+
+def test_nothing_is_kept_where_nobody_wants_it(tmp_path):
+    with WatchedSession(tmp_path, keep=0.0) as session:
+        session.state.publish(String(data='ENABLED'))
+        session.state.publish(String(data='FAULT'))
+        session.serve(0.5)
+        # A recording that is begun now still has what is in force.
+        session.recorder.start()
+        session.wait_for({STATE: 1})
+    assert event_bags(tmp_path) == []
+    bag = open_bag(tmp_path / 'bag')
+    assert [m.data for _, m in bag.decoded(STATE)] == ['FAULT']
+
+
+@pytest.fixture(scope='module')
+def of_the_graph(tmp_path_factory):
+    """The bag of a fault of the whole graph, long after most of what is latched was said."""
+    folder = tmp_path_factory.mktemp('graph')
+    overrides = {
+        'recorder': {'bag': str(folder / 'bag'), 'autostart': False, 'keep': 3.0},
+        # Load cells may fall silent.
+        'conductor': {'wait_for': [MOTOR_MEASURED]},
+    }
+    extra = (InstrumentModelNode, RecorderNode)
+    with SimulatedGraph(extra=extra, overrides=overrides) as graph:
+        graph.enable()
+        graph.calibrate()
+        graph.advance(5.0)
+        graph.set('load_cells', connected=False)
+        graph.advance(4.0)
+        assert graph.state == 'FAULT'
+        cause = graph.cause
+    return folder, cause
+
+
+def test_a_fault_of_the_graph_tells_its_cause(of_the_graph, capsys):
+    folder, cause = of_the_graph
+    [path] = event_bags(folder)
+    [event] = events_of(open_bag(path).metadata)
+    assert (event.kind, event.reason) == ('fault', cause)
+    assert main(['bag', 'list', str(folder), '--json']) == 0
+    [entry] = json.loads(capsys.readouterr().out)
+    assert (entry['kind'], entry['events'][0]['reason']) == ('fault', cause)
+
+
+@pytest.mark.parametrize(
+    'topic',
+    [
+        *('rig/kind', 'calibration/result', 'calibration/numbers', 'compensator/state'),
+        *('robot_description', 'slave/operating_state', 'slave/motion_session'),
+    ],
+)
+def test_what_was_latched_long_before_stands_at_its_beginning(of_the_graph, topic):
+    folder, _ = of_the_graph
+    [path] = event_bags(folder)
+    [file] = path.glob('*.mcap')
+    # The file alone.
+    bag = open_bag(file)
+    name = bag.find(topic, 'endoscope')
+    assert bag.times(name).log_ns[0] == bag.start_ns
+    assert kind_of_bag(bag).kind is Kind.SIMULATED
+    session = next(m.frame_id for _, m in bag.decoded(bag.find('slave/motion_session')))
+    assert session.startswith('session-')
