@@ -15,10 +15,7 @@ from endoscope_core.classifier.classification import (
 )
 from endoscope_core.classifier.held_out_calibration import STRANGE
 from endoscope_core.classifier.weights_file import load_classifier
-from endoscope_core.dataset import (
-    CLASSES_DEG,
-    TubeConfiguration,
-)
+from endoscope_core.dataset import CLASSES_DEG, TubeConfiguration
 from endoscope_core.dataset.rig_variation import calibration_command
 from endoscope_core.physics import SensorModel, simulate
 from endoscope_core.signals import (
@@ -76,7 +73,6 @@ _HEAD = '{:8s} class right  refused  probability: mean, least  size: rms   90 % 
 
 
 def _line(trials: list) -> str:
-
     judged = [t for t in trials if t.result is not None]
     right = sum(t.result.class_deg == t.class_deg for t in judged)
     probability = [t.result.probability for t in judged]

@@ -103,6 +103,5 @@ def _if_there(path: Path) -> Path | None:
 
 
 def _cpu_seconds() -> float:
-
     usages = (resource.getrusage(w) for w in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     return sum(usage.ru_utime + usage.ru_stime for usage in usages)

@@ -79,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
     return 1 if crept else 0
 
 
-def _trials(name: str, hand: 'Hand', repetitions: int) -> int:
+def _trials(name: str, hand: Hand, repetitions: int) -> int:
     """Let an event happen again and again, and print its row; how often something crept."""
     outcomes: list[Outcome] = []
     try:
@@ -95,7 +95,7 @@ def _trials(name: str, hand: 'Hand', repetitions: int) -> int:
     return sum(outcome.crept > SAME_RAD for outcome in outcomes)
 
 
-def _row(name: str, outcomes: Sequence['Outcome']) -> str:
+def _row(name: str, outcomes: Sequence[Outcome]) -> str:
     loads = [outcome.load for outcome in outcomes]
     return table_row(
         name,

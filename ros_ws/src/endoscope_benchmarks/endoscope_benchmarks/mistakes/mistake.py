@@ -1,4 +1,4 @@
-"""`endoscope bench mistakes`: whether what people take wrongly is said, and nothing else."""
+"""`endoscope bench mistakes`: whether mistakes of people are reported, and nothing else."""
 
 import argparse
 import time
@@ -20,7 +20,7 @@ from endoscope_explain.recording import BENDING, COMMAND, MOTOR, WIRES, Recordin
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print what was not said rightly and a table, or the numbers; return 0."""
+    """Print what was not reported correctly and a table, or the thresholds; return 0."""
     with worker_pool(args.jobs) as pool:
         if args.derive:
             _derive(args, pool)
@@ -30,7 +30,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _measure(args: argparse.Namespace, pool: Executor) -> None:
-
     cases = [(name, seed) for name in MISTAKES for seed in args.seeds]
     cases += [('', seed) for seed in args.sound]
     rows = []
@@ -57,7 +56,6 @@ def _measure(args: argparse.Namespace, pool: Executor) -> None:
 
 
 def _derive(args: argparse.Namespace, pool: Executor) -> None:
-
     try:
         partly = deriving.without_worth(list(pool.map(deriving.seen, args.sound)))
         worths = list(pool.map(deriving.least_worth, args.sound, [partly] * len(args.sound)))

@@ -126,7 +126,7 @@ def classifiers_rows(settings: PapersBench) -> list[Row]:
     return found
 
 
-def _ours(name: str, dataset: 'CalibrationDataset', settings: PapersBench) -> Row:
+def _ours(name: str, dataset: CalibrationDataset, settings: PapersBench) -> Row:
     """The classifier that comes with the project, which was trained on none of the recordings."""
     settings.report(f'ours, {name}')
     classifier = load_classifier(motion=dataset.motion)
@@ -273,7 +273,7 @@ def real_sizes_rows(settings: PapersBench) -> list[Row]:
     ]
 
 
-def _of_the_network(recordings: 'Sequence[RealRecording]') -> Row:
+def _of_the_network(recordings: Sequence[RealRecording]) -> Row:
     """The shipped network, which knows 90 deg where these tubes were moved by 60."""
     classifier, motion = load_classifier(), calibration_motion()
     phase = np.arange(motion.samples) / CALIBRATION_RATE

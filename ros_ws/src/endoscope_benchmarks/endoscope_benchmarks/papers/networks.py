@@ -21,11 +21,6 @@ class CrossValidation:
     # (7, 7): rows are true classes, columns named ones, over all folds.
     confusion: NDArray[np.int64]
 
-    @property
-    def mean_accuracy(self) -> float:
-        """Share of right classes over all recordings."""
-        return float(np.trace(self.confusion) / np.sum(self.confusion))
-
     @classmethod
     def of(
         cls,
@@ -115,11 +110,7 @@ def predict(network: TensionCnn, tension: NDArray[np.float32]) -> NDArray[np.flo
         return torch.softmax(network(as_input(tension)), dim=1).numpy().astype(np.float64)
 
 
-def cross_validate(
-    dataset: CalibrationDataset,
-    seed: int,
-    folds: int = 5,
-) -> CrossValidation:
+def cross_validate(dataset: CalibrationDataset, seed: int, folds: int = 5) -> CrossValidation:
     """Stratified k-fold cross-validation that keeps each tube configuration on one side."""
     named = np.zeros_like(dataset.class_deg)
     split = grouped_folds(dataset, seed, folds)
