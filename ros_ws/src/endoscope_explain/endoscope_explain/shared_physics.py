@@ -1,15 +1,22 @@
 """Which effects explain several recordings of one rig best together; see `search.levels`."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
 from endoscope_core.physics.effects import describe
-from endoscope_explain.decide.given_physics import GivenJoints, GivenPhysics, without_recording
+from endoscope_explain.decide.decision import found_together
+from endoscope_explain.decide.given_physics import (
+    GivenJoints,
+    GivenPhysics,
+    Rivalry,
+    without_recording,
+)
 from endoscope_explain.fit.nominal import ReferenceFits, with_references
 from endoscope_explain.fit.pooled import judged_alone
 from endoscope_explain.observe.observation import observe, with_held_noise
-from endoscope_explain.pipeline import Sources, read_inputs, refuse_other_joints
+from endoscope_explain.pipeline import Inputs, Sources, read_inputs, refuse_other_joints
 from endoscope_explain.search.levels import search
 
 
@@ -17,23 +24,32 @@ def physics_of_all(
     sources: Sequence[Sources], jobs: int, tell: Callable[[str], None]
 ) -> list[GivenJoints]:
     """Effects that explain all recordings of a rig; BagError if one cannot be used."""
+    return physics_of_inputs((read_inputs(one) for one in sources), jobs, tell)
+
+
+def physics_of_inputs(
+    inputs: Iterable[Inputs], jobs: int, tell: Callable[[str], None]
+) -> list[GivenJoints]:
+    """Effects that explain all recordings of a rig, which are read and audited."""
     recordings: list[dict[str, ReferenceFits]] = []
+    most_effects, first_bag = 0, Path()
     with threadpool_limits(1, 'blas'):
-        for one in sources:
-            inputs = read_inputs(one)
-            recording = inputs.audit.recording
+        for one in inputs:
+            sources, recording = one.sources, one.audit.recording
             if recordings:
-                refuse_other_joints(one.bag, recording.joints, sources[0].bag, recordings[0])
+                refuse_other_joints(sources.bag, recording.joints, first_bag, recordings[0])
+            else:
+                most_effects, first_bag = sources.most_effects, sources.bag
             tell(f'{recording.name}: refitting the nominal plant')
             _, references = with_references(
                 recording,
-                with_held_noise(observe(recording, inputs.plant)),
-                inputs.plant,
-                one.band,
+                with_held_noise(observe(recording, one.plant)),
+                one.plant,
+                sources.band,
                 jobs,
             )
             recordings.append(dict(zip(recording.joints, references, strict=True)))
-        return shared_effects(recordings, sources[0].most_effects, jobs, tell)
+        return shared_effects(recordings, most_effects, jobs, tell)
 
 
 def shared_effects(
@@ -47,9 +63,14 @@ def shared_effects(
     for joint in recordings[0]:
         tell(f'searching what {joint} lacks in all recordings')
         references = [of_joint[joint] for of_joint in recordings]
-        found = search(references, jobs, most_effects, tell=tell).found
+        tried = search(references, jobs, most_effects, tell=tell)
+        found = tried.found
+        rivalries = {
+            term.name: Rivalry(term.alternatives, term.margin, term.form)
+            for term in found_together(tried, jobs)
+        }
         for physics, own in zip(given, judged_alone(found.fits), strict=True):
             # A recording that has no use for an effect lacks it.
             there = tuple(e for e in found.effects if own.model.flags[describe(e).flag])
-            physics[joint] = without_recording(there, own)
+            physics[joint] = without_recording(there, own, rivalries)
     return list(given)

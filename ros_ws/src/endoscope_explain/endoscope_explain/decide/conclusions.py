@@ -98,6 +98,7 @@ def _named(joint: str, decision: Decision, term: MissingTerm, left: float) -> Na
             'gain': term.gain,
             'p_value': term.p_value,
             'margin': term.margin,
+            'form': term.form,
             'explained': decision.explained,
             'as_formula': float(modelled),
         },

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -52,6 +53,7 @@ class MissingTerm:
     margin: float  # by how much more than the best other name
     p_value: float  # chance that a rig in which nothing is missing shows as much
     formula: Candidate | None  # with the formula of `name`, where it was fitted
+    form: float = 0.0  # evidence in nats by which an error of form may mislead between names
 
     @property
     def is_known(self) -> bool:
@@ -103,6 +105,15 @@ def decide(search: JointSearch, jobs: int) -> Decision:
     return Decision(chosen, missing, share_explained(search.nominal, chosen), instead)
 
 
+def found_together(search: JointSearch, jobs: int) -> tuple[MissingTerm, ...]:
+    """The effects that several recordings of a rig lack, each with the rivals that all leave."""
+    missing: tuple[MissingTerm, ...] = ()
+    for level in takewhile(lambda each: each.is_found, search.levels):
+        if not level.adds_nothing(level.best):
+            missing = (*missing[: len(level.best.terms) - 1], _missing(level, level.best, jobs))
+    return _named_as_chosen(search, search.found, missing, jobs)
+
+
 def _with_form(one: Candidate, jobs: int) -> Candidate:
     return replace(one, fits=(with_form(one.fit, jobs),))
 
@@ -143,7 +154,9 @@ def _missing(level: Level, best: Candidate, jobs: int) -> MissingTerm:
             # The function is there; the effect whose formula comes nearest may not be.
             name, formula = last.id, None
     margin = gain - max(best_other, 0.0)
-    return MissingTerm(last, name, alternatives, gain, margin, level.p_value, formula)
+    return MissingTerm(
+        last, name, alternatives, gain, margin, level.p_value, formula, level.form_is_worth()
+    )
 
 
 def _name(level: Level, one: Candidate) -> str:

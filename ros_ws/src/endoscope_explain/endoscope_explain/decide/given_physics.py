@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,18 @@ Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
+class Rivalry:
+    """What was tried in an effect's place where it was chosen."""
+
+    alternatives: tuple[str, ...]  # names that were not told from it, nearest first
+    margin: float  # by how much more evidence in nats it has than the best other name
+    form: float  # as in `MissingTerm`
+
+
+UNRIVALLED = Rivalry((), 0.0, 0.0)
+
+
+@dataclass(frozen=True)
 class GivenPhysics:
     """A fitted joint without its recording."""
 
@@ -30,16 +42,22 @@ class GivenPhysics:
     flags: Flags  # (flags,)
     free: tuple[FreeParameter, ...]  # as in `JointModel`
     theta: Array  # (n,)
+    # By effect; none where it was not chosen by a search.
+    rivalries: Mapping[str, Rivalry] = field(default_factory=dict)
 
 
 GivenJoints = Mapping[str, GivenPhysics]
 """By joint."""
 
 
-def without_recording(effects: tuple[str, ...], found: Fit) -> GivenPhysics:
+def without_recording(
+    effects: tuple[str, ...], found: Fit, rivalries: Mapping[str, Rivalry] | None = None
+) -> GivenPhysics:
     """The physics of a fit."""
     model = found.model
-    return GivenPhysics(effects, model.base, model.flags, model.free, found.theta)
+    return GivenPhysics(
+        effects, model.base, model.flags, model.free, found.theta, dict(rivalries or {})
+    )
 
 
 def explained_by(
@@ -57,7 +75,7 @@ def explained_by(
         model = JointModel(references[0].model.observation, given.base, given.flags, given.free)
         found = fit(model, given.theta, iterations=TO_THE_END, tolerance=SETTLED)
         terms = tuple(Term(describe(each)) for each in given.effects)
-        missing = _needed(candidate(terms, found), given.effects, jobs)
+        missing = _needed(candidate(terms, found), given, jobs)
     beside = decide(JointSearch(candidate((), found), ()), jobs)
     tried: tuple[Level, ...] = ()
     if not beside.adequate:
@@ -70,11 +88,16 @@ def explained_by(
     )
 
 
-def _needed(whole: Candidate, effects: tuple[str, ...], jobs: int) -> tuple[MissingTerm, ...]:
-    """Each given effect with what the joint loses without it."""
-    lesser = [without_effect(whole.fit, effect_id) for effect_id in effects]
+def _needed(whole: Candidate, given: GivenPhysics, jobs: int) -> tuple[MissingTerm, ...]:
+    """Each given effect with what the joint loses without it, and its rivals where it has any."""
+    lesser = [without_effect(whole.fit, effect_id) for effect_id in given.effects]
     fits = parallel_map(lambda less: fit(*less), lesser, jobs)
-    return tuple(
+    alone = tuple(
         MissingTerm(term, term.id, (), whole.evidence - log_evidence(less), 0.0, math.nan, whole)
         for term, less in zip(whole.terms, fits, strict=True)
+    )
+    rivalries = [given.rivalries.get(term.name, UNRIVALLED) for term in alone]
+    return tuple(
+        replace(term, alternatives=rivalry.alternatives, margin=rivalry.margin, form=rivalry.form)
+        for term, rivalry in zip(alone, rivalries, strict=True)
     )

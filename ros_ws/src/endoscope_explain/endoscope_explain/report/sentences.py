@@ -31,6 +31,7 @@ EVIDENCE = {
     'p_value': 'share of rigs without it in which as much is found',
     'second_p_value': 'chance that it predicts the second recording no better',
     'margin': 'nats by which it adds more than the best other name',
+    'form': 'nats by which an error of form may mislead between names',
     'as_formula': '1 where the plant has its formula, 0 where it has a fitted function',
     'explained': 'share of the excess misfit that is gone with all that was found',
     'count': 'samples that show it',

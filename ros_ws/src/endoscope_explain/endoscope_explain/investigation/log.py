@@ -1,0 +1,218 @@
+"""What an investigation asked, why, and what was answered: kept after every step."""
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from enum import StrEnum
+from pathlib import Path
+
+from endoscope_core.atomic_output import require_place, write_text
+from endoscope_core.errors import FileError, InputError
+from endoscope_core.schema import read
+
+LOG_JSON, LOG_MD, PAGE, PLANT = 'log.json', 'log.md', 'index.html', 'plant.yaml'
+COMMISSIONING = 'commissioning'
+SCHEMA = 1
+
+
+class Stop(StrEnum):
+    """Why no further motion is asked for."""
+
+    ONE_CLASS = 'one_class_left'
+    NOTHING_TO_GAIN = 'nothing_to_gain'
+    USED_UP = 'experiments_used_up'
+    INTERRUPTED = 'interrupted'
+    FAULT = 'fault'
+
+
+GOES_ON = (Stop.INTERRUPTED, Stop.FAULT, Stop.USED_UP)
+"""After these an investigation may be continued."""
+STOP_WORDS = {
+    Stop.ONE_CLASS: 'One class is left',
+    Stop.NOTHING_TO_GAIN: 'Nothing more can be gained',
+    Stop.USED_UP: 'The experiments are used up',
+    Stop.INTERRUPTED: 'It was interrupted',
+    Stop.FAULT: 'The rig stopped it',
+}
+
+
+@dataclass(frozen=True)
+class Name:
+    """An effect that the recordings show, as the log keeps it."""
+
+    id: str
+    joint: str
+    rivals: tuple[str, ...]  # that the recordings do not tell from it, nearest first
+    strength: str  # its first number with its 90 % interval, in words
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What all recordings so far say together."""
+
+    verdict: str
+    sentence: str
+    names: tuple[Name, ...]
+    # Misfit over noise (rms) of the worst signal, by the described and by the improved plant.
+    described: float | None
+    improved: float | None
+    seconds: float  # that explaining took
+
+
+@dataclass(frozen=True)
+class Round:
+    """One motion: what was asked, and what came of it."""
+
+    motion: str  # its waveform
+    joint: str  # that it moves
+    why: str
+    file: str  # of the motion, in the folder
+    duration_s: float
+    largest_deg: float
+    bag: str  # its folder, in the folder
+    recorded: bool = False  # whole, from begin to end
+    ended: str = ''  # why it is not whole
+    answer: Answer | None = None
+
+
+@dataclass(frozen=True)
+class Log:
+    """An investigation from its beginning to now."""
+
+    schema: int
+    plant: str  # file of the described plant
+    plant_sha256: str
+    rounds: tuple[Round, ...] = ()
+    stopped: Stop | None = None
+    words: str = ''  # why, in a sentence
+
+    @property
+    def whole(self) -> tuple[Round, ...]:
+        """Rounds that were recorded to their end."""
+        return tuple(each for each in self.rounds if each.recorded)
+
+    @property
+    def last_answer(self) -> Answer | None:
+        """What is known now."""
+        answers = [each.answer for each in self.rounds if each.answer is not None]
+        return answers[-1] if answers else None
+
+    def with_last(self, **changed: object) -> 'Log':
+        """The log with its last round changed."""
+        return replace(
+            self,
+            rounds=(*self.rounds[:-1], replace(self.rounds[-1], **changed)),  # type: ignore[arg-type]
+        )
+
+    def ended(self, stop: Stop, words: str) -> 'Log':
+        """The log with why it ends."""
+        return replace(self, stopped=stop, words=words)
+
+    def write(self, folder: Path) -> None:
+        """Write it as data and in sentences."""
+        text = json.dumps(asdict(self), indent=1, allow_nan=False)
+        write_text(folder / LOG_JSON, text + '\n')
+        write_text(folder / LOG_MD, '\n'.join(in_sentences(self)) + '\n')
+
+
+def begun(folder: Path, plant: Path) -> Log:
+    """The log of a folder, to be continued, or that of a new one.
+
+    InputError if the folder holds something else, an investigation of another plant, or one that
+    has come to its end.
+    """
+    digest = hashlib.sha256(plant.read_bytes()).hexdigest()
+    file = folder / LOG_JSON
+    if not file.exists():
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise InputError(
+                f'{folder} holds no investigation, and is not empty: name another folder'
+            )
+        require_place(folder)
+        return Log(SCHEMA, str(plant), digest)
+    log = _read(file)
+    if log.plant_sha256 != digest:
+        raise InputError(
+            f'{folder} investigates a rig by {log.plant}, which is another plant than {plant} is '
+            'now: name another folder'
+        )
+    if log.stopped is not None and log.stopped not in GOES_ON:
+        raise InputError(f'{folder} is at its end: {log.words} Name another folder')
+    return replace(log, stopped=None, words='')
+
+
+def _read(file: Path) -> Log:
+    try:
+        content = json.loads(file.read_text('utf-8'))
+    except (OSError, ValueError) as error:
+        raise FileError(f'{file} cannot be read as a log: {error}') from error
+    if isinstance(content, Mapping) and content.get('stopped') is not None:
+        content = dict(content)
+        if content['stopped'] not in list(Stop):
+            raise FileError(f'{file}: stopped is {content["stopped"]!r}')
+        stopped = Stop(content.pop('stopped'))
+        return replace(read(_Kept, content, str(file)).log(), stopped=stopped)
+    return read(_Kept, content, str(file)).log()
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """A log as its file has it."""
+
+    schema: int
+    plant: str
+    plant_sha256: str
+    rounds: tuple[Round, ...] = ()
+    stopped: None = None
+    words: str = ''
+
+    def log(self) -> Log:
+        return Log(self.schema, self.plant, self.plant_sha256, self.rounds, None, self.words)
+
+
+def in_sentences(log: Log) -> list[str]:
+    """What was asked, why, and what was answered; Markdown, a line an element."""
+    lines = ['# What was asked, and what was answered', '', f'Described plant: `{log.plant}`.']
+    for number, each in enumerate(log.rounds, 1):
+        lines += ['', f'## {number}. {asked(each)}', '', f'Why: {each.why}', '']
+        lines.append(recorded(each))
+        if each.answer is not None:
+            lines += ['', *(f'- {line}' for line in answered(each.answer))]
+    if log.stopped is not None:
+        lines += ['', '## End', '', log.words]
+    return lines
+
+
+def asked(each: Round) -> str:
+    """What a round asks of the rig."""
+    return (
+        f'{each.motion.capitalize()} of {each.joint}, {each.duration_s:.0f} s, '
+        f'at most {each.largest_deg:.0f} deg'
+    )
+
+
+def recorded(each: Round) -> str:
+    """What became of a round's recording."""
+    if each.recorded:
+        return f'Recorded: `{each.bag}`, as `{each.file}` asks.'
+    if each.ended:
+        return f'Not recorded to its end: {each.ended}'
+    return 'Not recorded yet.'
+
+
+def answered(answer: Answer) -> Sequence[str]:
+    """What is known after a round, in sentences."""
+    lines = [answer.sentence]
+    for name in answer.names:
+        others = ' or '.join(name.rivals)
+        told = f'not told from {others}' if others else 'told from all others'
+        strength = f', {name.strength}' if name.strength else ''
+        lines.append(f'{name.id} of {name.joint}{strength}: {told}.')
+    if answer.described is not None and answer.improved is not None:
+        lines.append(
+            f'The worst signal is off by {answer.described:.3g} times its noise with the described '
+            f'plant, by {answer.improved:.3g} times with the improved one.'
+        )
+    lines.append(f'Explained in {answer.seconds:.0f} s.')
+    return lines

@@ -1,0 +1,229 @@
+"""The loop of motions and explanations, on simulated rigs."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+from endoscope_core.errors import InputError
+from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
+from endoscope_core.physics.plant_file import load_plant, save_plant
+from endoscope_core.rig import shipped_rig
+from endoscope_core.signals import hold, move, sequence
+from endoscope_core.signals.command_file import JOINTS, CommandTable, read_command_file
+from endoscope_explain.audit import audit_recording
+from endoscope_explain.investigation.investigation import (
+    Investigation,
+    NotPlayedError,
+    RigStoppedError,
+    investigate,
+)
+from endoscope_explain.investigation.log import LOG_JSON, LOG_MD, PLANT, Stop, begun
+from endoscope_explain.investigation.motions import (
+    Motion,
+    MotionRefusedError,
+    commissioning,
+    require_allowed,
+)
+from endoscope_explain.pipeline import Inputs, Sources, explain_case
+from endoscope_explain.shared_physics import physics_of_inputs
+
+TO_ONE_SIDE = sequence(
+    'to one side', [hold(1.0), move(0.0, 0.9, 2.0), hold(1.5, 0.9), move(0.9, 0.0, 2.0), hold(1.0)]
+)
+"""Too little to tell a bias from crosstalk."""
+RIG = shipped_rig()
+ONE = PlantDescription({'bend_x': JointParameters()})
+BIAS = EffectSpec('load_cell_bias', 'bend_x', {})
+
+
+class SimulatedRig:
+    """A rig of one joint whose recordings are kept in memory."""
+
+    def __init__(self, record, plant):
+        self._record, self._plant = record, plant
+        self.recordings = {}
+        self.played = []
+
+    def play(self, motion, file, bag):
+        """Play a motion as far as the file asks; the first one is a short one."""
+        table = read_command_file(file)
+        time, angle = table.time, table.angle[:, :1]
+        if not self.played:
+            signal = TO_ONE_SIDE
+            time = np.arange(0.0, signal.duration, 0.001)
+            angle = signal(time)[0][:, None]
+        ticks = np.arange(0.0, time[-1], 0.001)
+        shaft = RIG.joints.gear * np.interp(ticks, time, angle[:, 0])[:, None]
+        duration = len(shaft) * 0.001
+        self.played.append(motion.waveform)
+        recording = self._record(self._plant, duration, len(self.played), shaft)
+        self.recordings[bag] = dataclasses.replace(recording, name=bag.name, rig=RIG)
+
+    def explain(self, bags):
+        """Explain the recordings of bags together, as `explain_together` does."""
+        inputs = [
+            Inputs(
+                Sources(bag, ONE, quick=True, most_effects=1),
+                audit_recording(self.recordings[bag], ONE),
+            )
+            for bag in bags
+        ]
+        if len(bags) > 1:
+            given = physics_of_inputs(inputs, 2, lambda _: None)
+            inputs = [
+                dataclasses.replace(one, sources=dataclasses.replace(one.sources, given=own))
+                for one, own in zip(inputs, given, strict=True)
+            ]
+        return [explain_case(one, jobs=2) for one in inputs]
+
+
+@pytest.fixture
+def plant_file(tmp_path):
+    file = tmp_path / 'described.yaml'
+    save_plant(ONE, file)
+    return file
+
+
+def log_of(folder):
+    return json.loads((folder / LOG_JSON).read_text())
+
+
+def test_a_second_motion_tells_the_rivals_that_the_first_one_left(record, tmp_path, plant_file):
+    rig = SimulatedRig(record, dataclasses.replace(ONE, effects=(BIAS,)))
+    out = tmp_path / 'out'
+    log = investigate(Investigation(out, plant_file, RIG), rig.play, rig.explain)
+    first, last = (each.answer.names for each in log.rounds)
+    assert [(name.id, bool(name.rivals)) for name in first] == [('load_cell_bias', True)]
+    assert [(name.id, bool(name.rivals)) for name in last] == [('load_cell_bias', False)]
+    assert log.stopped is Stop.ONE_CLASS
+    assert rig.played == [log.rounds[0].motion, log.rounds[1].motion]
+    (spec,) = load_plant(out / PLANT).effects
+    assert spec.parameters['bias_n'] == pytest.approx(0.3, abs=0.01)
+    assert 'not told from load_cell_crosstalk' in (out / LOG_MD).read_text()
+
+
+def no_rig(motion, file, bag):
+    """Make a folder in place of a recording, since what it says is given."""
+    bag.mkdir()
+
+
+@pytest.fixture
+def both(tmp_path):
+    """An investigation of a rig of two joints."""
+    file = tmp_path / 'described.yaml'
+    save_plant(PlantDescription(), file)
+    return Investigation(tmp_path / 'out', file, RIG, experiments=1)
+
+
+@pytest.fixture
+def told(stribeck_case):
+    """A case in which no name has a rival."""
+    (effect,) = stribeck_case.effects
+    return dataclasses.replace(
+        stribeck_case, effects=(dataclasses.replace(effect, alternatives=()),)
+    )
+
+
+def test_no_more_motions_are_asked_for_than_are_wanted(both, stribeck_case):
+    log = investigate(both, no_rig, lambda bags: [stribeck_case] * len(bags))
+    assert log.stopped is Stop.USED_UP
+    assert log.rounds[0].motion == 'commissioning'
+    assert len(log.rounds) == 2
+    assert 'viscous_friction' in log.words
+    # More of them continue it.
+    again = investigate(
+        dataclasses.replace(both, experiments=2), no_rig, lambda bags: [stribeck_case] * len(bags)
+    )
+    assert len(again.rounds) == 3
+    motions = {(each.motion, each.joint) for each in again.rounds}
+    assert len(motions) == 3
+
+
+def test_a_fault_ends_it_with_what_is_known_and_it_is_continued(both, stribeck_case, told):
+    def breaks_down(motion, file, bag):
+        if bag.name == 'bag_2':
+            raise RigStoppedError('FAULT: wire_x_pos at 61 N')
+        bag.mkdir()
+
+    log = investigate(both, breaks_down, lambda bags: [stribeck_case] * len(bags))
+    assert log.stopped is Stop.FAULT
+    assert 'wire_x_pos at 61 N' in log.words
+    assert log.rounds[0].answer.names[0].id == 'stribeck_friction'
+    assert not log.rounds[1].recorded
+    assert 'wire_x_pos at 61 N' in log.rounds[1].ended
+    assert load_plant(both.folder / PLANT).effects
+    explained = []
+
+    def explain(bags):
+        explained.append([bag.name for bag in bags])
+        return [(told if len(bags) > 1 else stribeck_case) for _ in bags]
+
+    again = investigate(both, no_rig, explain)
+    # The recording that broke off is used no more, and its motion is asked for again.
+    assert explained == [['bag_1'], ['bag_1', 'bag_3']]
+    assert again.stopped is Stop.ONE_CLASS
+
+
+def test_ctrl_c_loses_nothing(both, stribeck_case):
+    def interrupted(motion, file, bag):
+        if bag.name == 'bag_2':
+            raise KeyboardInterrupt
+        bag.mkdir()
+
+    with pytest.raises(KeyboardInterrupt):
+        investigate(both, interrupted, lambda bags: [stribeck_case] * len(bags))
+    kept = log_of(both.folder)
+    assert kept['stopped'] == 'interrupted'
+    assert kept['rounds'][0]['answer']['names'][0]['id'] == 'stribeck_friction'
+    assert kept['rounds'][1]['ended']
+
+
+def test_a_motion_that_nobody_wants_is_not_played(both, told):
+    def declined(motion, file, bag):
+        raise NotPlayedError('the operator answered no')
+
+    log = investigate(both, declined, lambda bags: [told])
+    assert log.stopped is Stop.INTERRUPTED
+    assert log.last_answer is None
+
+
+def test_what_is_at_its_end_is_not_begun_again(both, told):
+    assert investigate(both, no_rig, lambda bags: [told]).stopped is Stop.ONE_CLASS
+    with pytest.raises(InputError, match='at its end: One class is left'):
+        begun(both.folder, both.plant_file)
+
+
+def test_another_plant_or_a_folder_of_something_else_is_refused(both, tmp_path, stribeck_case):
+    with pytest.raises(InputError, match='holds no investigation'):
+        begun(tmp_path, both.plant_file)
+    dropped = dataclasses.replace(both, experiments=0)
+    investigate(dropped, no_rig, lambda bags: [stribeck_case])
+    save_plant(ONE, both.plant_file)
+    with pytest.raises(InputError, match='another plant'):
+        begun(both.folder, both.plant_file)
+
+
+def test_the_commissioning_motion_keeps_to_the_limits_of_the_rig():
+    slow = dataclasses.replace(RIG, joints=dataclasses.replace(RIG.joints, reach=0.6, speed=2.0))
+    motion = commissioning(PlantDescription(), slow)
+    require_allowed(motion, slow)
+    assert motion.largest <= 0.6
+    with pytest.raises(MotionRefusedError, match='largest angle is'):
+        require_allowed(commissioning(PlantDescription(), RIG), slow)
+
+
+def test_a_rig_that_the_plant_answers_with_too_much_tension_is_not_moved():
+    tension = dataclasses.replace(RIG.tension, calibration_ceiling=5.0)
+    weak = dataclasses.replace(RIG, tension=tension)
+    with pytest.raises(MotionRefusedError, match='more than 5 N'):
+        commissioning(PlantDescription(), weak)
+
+
+def test_a_motion_that_is_too_fast_is_refused():
+    time = np.array([0.0, 1.0, 1.1, 2.0])
+    angle = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0], [1.0, 0.0]])
+    motion = Motion('jump', 'bend_x', '', CommandTable(JOINTS, time, angle))
+    with pytest.raises(MotionRefusedError, match='speed is 10 rad/s'):
+        require_allowed(motion, RIG)
