@@ -23,6 +23,7 @@ from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.physics.family import shipped_family
 from endoscope_core.signals import calibration_sinusoid, motion_by_name
 from endoscope_nodes.client.calibration_result import REACH
+from endoscope_nodes.client.graph_listener import GraphError
 from endoscope_nodes.graph import SHOWING_NODES
 from endoscope_nodes.names import CALIBRATION_COMMAND, CLOCK_NODE, JOINTS, MASTER_NODE
 
@@ -130,4 +131,6 @@ def _track(
     graph.advance(APPROACH_S + motion_by_name(motion).duration)
     end = graph.now()
     graph.set(MASTER_NODE, source='none')
+    if graph.client.state != 'ENABLED':
+        raise GraphError(f'{tube.name}, {motion}: {graph.client.state}: {graph.client.why}')
     return Segment(tube.name, motion, method, start, end)
