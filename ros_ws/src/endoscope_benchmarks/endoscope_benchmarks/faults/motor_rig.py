@@ -1,9 +1,5 @@
 """The nodes that move the motors, on emulated servos behind a real terminal, in real time."""
 
-import os
-import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -17,6 +13,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_msgs.msg import String
 
+from endoscope_benchmarks.faults.node_processes import NodeProcesses
 from endoscope_core.exit_status import ClosedOnExit
 from endoscope_devices.dynamixel.control_table import COUNT
 from endoscope_emulators.dynamixel.process import EmulatorProcess
@@ -82,7 +79,9 @@ class MotorRig(ClosedOnExit):
             domain_id=domain,
             overrides={k: v for k, v in overrides.items() if k not in apart},
         )
-        self._processes = {name: _start(name, overrides[name], domain) for name in apart}
+        self._processes = NodeProcesses(domain, folder)
+        for name in apart:
+            self._processes.start(name, {name: overrides[name]})
         for name, factory in _NODES.items():
             if name not in apart:
                 self.runtime.add(factory)
@@ -186,8 +185,7 @@ class MotorRig(ClosedOnExit):
 
     def kill(self, name: str) -> None:
         """End the process of a node with SIGKILL."""
-        self._processes[name].send_signal(signal.SIGKILL)
-        self._processes[name].wait()
+        self._processes.kill(name)
 
     def stopped_after(self, since: float) -> float | None:
         """Seconds from ``since`` (monotonic) until both shafts stood still for good; else None."""
@@ -209,20 +207,5 @@ class MotorRig(ClosedOnExit):
             self.probe.destroy_node()
             self.runtime.close()
         finally:
-            for process in self._processes.values():
-                process.kill()
-                process.wait()
+            self._processes.close()
             self.emulator.close()
-
-
-def _start(name: str, parameters: dict[str, Any], domain: int) -> subprocess.Popen:
-    code = (
-        'import sys; from endoscope_nodes.program import PROGRAMS; '
-        f'sys.exit(PROGRAMS[{name!r}].start())'
-    )
-    arguments = [word for k, v in parameters.items() for word in ('-p', f'{k}:={v}')]
-    return subprocess.Popen(
-        [sys.executable, '-c', code, '--ros-args', *arguments],
-        env=os.environ | {'ROS_DOMAIN_ID': str(domain)},
-        stderr=subprocess.DEVNULL,
-    )
