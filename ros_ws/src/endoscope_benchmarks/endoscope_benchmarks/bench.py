@@ -71,6 +71,12 @@ def table_head(*columns: str) -> str:
     return f'{table_row(*columns)}\n|{"---|" * len(columns)}'
 
 
+def spread(values: Sequence[float]) -> tuple[float, float, float]:
+    """Median, what 99 % do not exceed, and the largest."""
+    ordered = sorted(values)
+    return ordered[len(ordered) // 2], ordered[len(ordered) * 99 // 100], ordered[-1]
+
+
 def today_and_machine() -> str:
     """Date, cores and processor, which a table is headed by."""
     processor = platform.processor() or platform.machine()

@@ -14,7 +14,7 @@ from rclpy.context import Context
 from rclpy.task import Future
 from std_msgs.msg import String
 
-from endoscope_benchmarks.bench import cpu_seconds
+from endoscope_benchmarks.bench import cpu_seconds, spread
 from endoscope_benchmarks.faults.node_processes import NODES, NodeProcesses
 from endoscope_benchmarks.faults.operator import Operator
 from endoscope_core.safety import OperatingState
@@ -64,14 +64,13 @@ def composed_graph_is_carried(seconds: float) -> bool:
             graph.serve(seconds)
             elapsed, cpu = time.monotonic() - began, time.process_time() - cpu
             ticks, missed = ticker.ticks - ticks, ticker.missed - missed
-            latency.sort()
             machine = graph.node('supervisor').machine
             state = f'{machine.state} {machine.cause}'.strip()
             report = graph.node('recorder').stop()
         finally:
             graph.close()
     # From the instant at which the master's tick was due to the motor driver's obeying it.
-    middle, late = (1e-6 * latency[len(latency) * share // 100] for share in (50, 99))
+    middle, late, _ = (1e-6 * each for each in spread(latency))
     share, cores = ticks / (ticks + missed), cpu / elapsed
     print(
         f'one process, 1 kHz, {elapsed:.0f} s: {100 * share:.2f} % of ticks, command to motor '

@@ -165,21 +165,6 @@ def pairs(generator: Generator, seed: int) -> Case:
     return replace(case, laws=(law, other))
 
 
-def tenth(generator: Generator, seed: int) -> Case:
-    """One effect with a tenth of the strength."""
-    return catalogue(generator, seed, weaker=WEAKER)
-
-
-def sinusoid(generator: Generator, seed: int) -> Case:
-    """One effect under the 9 s calibration."""
-    return catalogue(generator, seed, motions.sinusoid)
-
-
-def teleoperation(generator: Generator, seed: int) -> Case:
-    """One effect under a surgeon's motion."""
-    return catalogue(generator, seed, motions.teleoperation)
-
-
 def other_simulator(generator: Generator, seed: int) -> Case:
     """A rig of `endoscope prove --form other`: sliding nodes, and laws of their own forms."""
     from endoscope_benchmarks.proof import OTHER
@@ -204,9 +189,9 @@ STRATA: dict[str, Callable[[Generator, int], Case]] = {
     'other_sheath': another_sheath,
     'nulls': nulls,
     'pairs': pairs,
-    'tenth': tenth,
-    'sinusoid': sinusoid,
-    'teleoperation': teleoperation,
+    'tenth': partial(catalogue, weaker=WEAKER),
+    'sinusoid': partial(catalogue, motion=motions.sinusoid),
+    'teleoperation': partial(catalogue, motion=motions.teleoperation),
     'two_states': two_states,
     'other_simulator': other_simulator,
 }

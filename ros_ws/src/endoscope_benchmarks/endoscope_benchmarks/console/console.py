@@ -12,7 +12,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
-import numpy as np
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
@@ -20,6 +19,7 @@ from websockets.typing import Origin
 from endoscope_benchmarks.bench import (
     cpu_seconds,
     require_known,
+    spread,
     table_head,
     table_row,
     today_and_machine,
@@ -95,23 +95,21 @@ def _trials(name: str, hand: Hand, repetitions: int) -> int:
     return sum(outcome.crept > SAME_RAD for outcome in outcomes)
 
 
+def _in_ms(values: Sequence[float]) -> str:
+    return ', '.join(f'{each:.0f}' for each in spread(values))
+
+
 def _row(name: str, outcomes: Sequence[Outcome]) -> str:
     loads = [outcome.load for outcome in outcomes]
     return table_row(
         name,
         len(outcomes),
-        _spread([max(0.0, outcome.last_change_ms) for outcome in outcomes]),
-        _spread([outcome.clutch_ms for outcome in outcomes]),
+        _in_ms([max(0.0, outcome.last_change_ms) for outcome in outcomes]),
+        _in_ms([outcome.clutch_ms for outcome in outcomes]),
         sum(max(o.clutch_ms, o.last_change_ms) > _AIM_MS for o in outcomes),
         f'{1e3 * max(outcome.crept for outcome in outcomes):.1f}',
         f'{min(loads):.0f} to {max(loads):.0f}',
     )
-
-
-def _spread(values: Sequence[float]) -> str:
-    ordered = sorted(values)
-    middle, late = ordered[len(ordered) // 2], ordered[len(ordered) * 99 // 100]
-    return f'{middle:.0f}, {late:.0f}, {ordered[-1]:.0f}'
 
 
 VIEWERS = 4
@@ -167,7 +165,7 @@ def input_latency(hand: Hand, inputs: int) -> Iterator[str]:
                 took.append(ms)
     hand.let_go()
     for topic, took in took_ms.items():
-        median, most = np.percentile(took, (50, 99))
+        median, most, _ = spread(took)
         yield (
             f'key to {topic}, {inputs} inputs: median {median:.0f} ms, 99 % {most:.0f} ms, '
             f'load average {os.getloadavg()[0]:.1f}'

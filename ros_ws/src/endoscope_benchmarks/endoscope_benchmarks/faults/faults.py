@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from random import Random
 
-from endoscope_benchmarks.bench import chosen, table_head, table_row, today_and_machine
+from endoscope_benchmarks.bench import chosen, spread, table_head, table_row, today_and_machine
 from endoscope_benchmarks.faults.process_faults import (
     COMPOSED_FAULTS,
     PROCESS_FAULTS,
@@ -91,4 +91,5 @@ def _row(name: str, outcomes: Sequence[Outcome], loads: Sequence[float]) -> str:
 def _middle_and_most(values: Sequence[float], form: str) -> str:
     if not values:
         return '-'
-    return f'{sorted(values)[len(values) // 2]:{form}}, {max(values):{form}}'
+    middle, _, most = spread(values)
+    return f'{middle:{form}}, {most:{form}}'
