@@ -93,11 +93,12 @@ class PlantLearning:
         self._speed = 0.0
         packed, on = packed_joint(parameters.joint)
         models = (len(LEARNT) + 1, 1)
-        self._packed, self._on = np.tile(packed, models), np.tile(on, models)
+        self._packed, on = np.tile(packed, models), np.tile(on, models)
         self._places = [NOMINAL_KEYS.index(name) for name in LEARNT]
         self._nominal = packed[self._places]
-        self._models = rest_state(self._packed, self._on, TICK)
-        self._inputs = np.zeros(INPUTS)
+        at_rest = rest_state(self._packed, on, TICK)
+        self._states = at_rest[0]
+        self._models = (*at_rest, self._packed, on, np.zeros(INPUTS))
         # As last set up in the models, which follow the estimates by notable steps.
         self.modelled = parameters
         self._modelled_logs = self._logs
@@ -112,7 +113,7 @@ class PlantLearning:
     @property
     def tip(self) -> float:
         """Bending angle predicted for now, rad."""
-        return float(self._models[0][0, JOINT])
+        return float(self._states[0, JOINT])
 
     def sent(self, command: float, dt: float) -> None:
         """Advance the models by a command (rad) in force for `dt` s."""
@@ -123,9 +124,9 @@ class PlantLearning:
         shaft = goal + a11 * behind + a12 * self._speed
         self._speed = a21 * behind + a22 * self._speed
         self._turns.follow(shaft)
-        turn_all(*self._models, self._packed, self._on, self._inputs, shaft, dt)
+        turn_all(self._models, shaft, dt)
         self._time += dt
-        self._history.append((self._time, self._models[0][:, JOINT].copy()))
+        self._history.append((self._time, self._states[:, JOINT].copy()))
         while self._history[0][0] < self._time - self._HISTORY:
             self._history.popleft()
 
@@ -210,7 +211,7 @@ class PlantLearning:
         for i, place in enumerate(self._places):
             self._packed[i + 1, place] *= math.exp(self._STEP)
         path = np.array(self._turns.values)
-        go_through_shafts(*self._models, self._packed, self._on, self._inputs, path)
+        go_through_shafts(self._models, path)
 
     def _scaled(self, logs: Array) -> JointParameters:
         first = self._first.joint
