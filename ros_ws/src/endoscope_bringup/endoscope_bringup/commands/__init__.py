@@ -9,6 +9,7 @@ COMMANDS: tuple[str, ...] = (
     'demo',
     'simulate',
     'explain',
+    'investigate',
     'invert',
     'convert',
     'operate',

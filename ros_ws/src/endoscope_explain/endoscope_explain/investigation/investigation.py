@@ -70,10 +70,7 @@ def explain_together(
 ) -> list[ExplainedCase]:
     """Explain recordings of one rig: one by itself, several by what all of them need."""
     plant = investigation.plant
-    sources = [
-        Sources(bag, plant, quick=True, rig=investigation.rig, plant_file=investigation.plant_file)
-        for bag in bags
-    ]
+    sources = [Sources(bag, plant, quick=True, plant_file=investigation.plant_file) for bag in bags]
     together = len(bags) > 1
     return explained_cases(sources, investigation.jobs, same_physics=together, progress=progress)
 
@@ -145,7 +142,7 @@ class _Running:
         file = self.of.folder / asked.file
         write_command_file(file, motion.table.time, motion.table.angle, JOINTS)
         self.keep(replace(self.log, rounds=(*self.log.rounds, asked)))
-        self.say(f'{number}. {logs.asked(asked)}. {asked.why}')
+        self.say(f'{number}. {motion.words}. {motion.why}')
         play(motion, file, self.of.folder / asked.bag)
         self.keep(self.log.with_last(recorded=True))
 
@@ -177,11 +174,12 @@ class _Running:
         answer = self.log.last_answer
         rivals = [name for name in answer.names if name.rivals] if answer else []
         left = ''.join(f' {r.id} is not told from {" or ".join(r.rivals)}.' for r in rivals[:1])
-        after = f'after {len(self.log.whole)} motions'
+        count = len(self.log.whole)
+        after = f'after {count} motions' if count > 1 else 'after one motion'
         return {
-            Stop.ONE_CLASS: f'No name has a rival {after}.',
-            Stop.NOTHING_TO_GAIN: f'No safe motion is expected to tell more {after}.{left}',
-            Stop.USED_UP: f'No more than {self.of.experiments} experiments were wanted.{left}',
+            Stop.ONE_CLASS: f'no name has a rival {after}.',
+            Stop.NOTHING_TO_GAIN: f'no safe motion is expected to tell more {after}.{left}',
+            Stop.USED_UP: f'no more than {self.of.experiments} experiments were wanted.{left}',
         }[stop]
 
     def end(self, stop: Stop, words: str) -> None:

@@ -186,10 +186,12 @@ def in_sentences(log: Log) -> list[str]:
 
 def asked(each: Round) -> str:
     """What a round asks of the rig."""
-    return (
-        f'{each.motion.capitalize()} of {each.joint}, {each.duration_s:.0f} s, '
-        f'at most {each.largest_deg:.0f} deg'
-    )
+    return in_words(each.motion, each.joint, each.duration_s, each.largest_deg)
+
+
+def in_words(motion: str, joint: str, duration_s: float, largest_deg: float) -> str:
+    """A motion as a person is asked for it."""
+    return f'{motion.capitalize()} of {joint}, {duration_s:.0f} s, at most {largest_deg:.0f} deg'
 
 
 def recorded(each: Round) -> str:

@@ -13,7 +13,7 @@ from endoscope_core.signals.command_file import JOINTS, CommandTable
 from endoscope_core.signals.motions import commissioning_motion
 from endoscope_explain.case import NextExperiment
 from endoscope_explain.design import SAMPLE_S, answer_to, as_played, is_safe
-from endoscope_explain.investigation.log import COMMISSIONING
+from endoscope_explain.investigation.log import COMMISSIONING, in_words
 
 Array = NDArray[np.float64]
 
@@ -45,6 +45,11 @@ class Motion:
     def largest(self) -> float:
         """Largest angle in rad, either way."""
         return float(np.abs(self.table.angle).max())
+
+    @property
+    def words(self) -> str:
+        """As a person is asked for it."""
+        return in_words(self.waveform, self.joint, self.duration, math.degrees(self.largest))
 
 
 def commissioning(plant: PlantDescription, rig: Rig) -> Motion:

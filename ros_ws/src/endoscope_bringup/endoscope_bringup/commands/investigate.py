@@ -1,0 +1,144 @@
+"""`endoscope investigate`: a rig moves, is explained, and is asked what tells the rest apart."""
+
+import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from endoscope_bringup.subcommands import COUNT, within
+
+if TYPE_CHECKING:
+    from endoscope_core.rig import Rig
+    from endoscope_nodes.client.graph_client import GraphClient
+
+LOOKS_S = 3.0
+"""For a graph that runs."""
+
+
+def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `investigate`."""
+    parser = subparsers.add_parser(
+        'investigate',
+        help='move a rig, explain it, and play what tells the rest apart, until it is explained',
+        description='Plays the commissioning motion on a running graph and explains the recording '
+        'by the plant P.yaml. As long as an effect has rivals, or its strength a wide interval, '
+        'plays the safe motion that tells most, and explains all recordings together. Writes bags, '
+        'log.json, log.md, index.html and the improved plant, plant.yaml, to DIR as it goes. The '
+        'same command on the same DIR continues what was interrupted. Each motion is asked for, '
+        'has a motion session of its own, and is refused beyond the limits of rig.yaml. Ctrl-C '
+        'pauses the graph. Exits 0 at the end, 1 if the rig or a person stopped it, 130 when '
+        'interrupted.',
+    )
+    parser.add_argument(
+        '--plant', type=Path, required=True, metavar='P.yaml', help='the plant as described'
+    )
+    parser.add_argument(
+        '--out',
+        type=Path,
+        required=True,
+        metavar='DIR',
+        help='a new or empty folder, or one that is to be continued',
+    )
+    parser.add_argument(
+        '--experiments',
+        type=within(0, 100, int),
+        default=4,
+        metavar='N',
+        help='motions after the commissioning motion at most (default 4)',
+    )
+    parser.add_argument(
+        '--attended',
+        action='store_true',
+        help='somebody stands at the rig with a hand on its emergency stop: motions are not asked '
+        'for one by one',
+    )
+    parser.add_argument(
+        '--simulate',
+        type=Path,
+        metavar='SLAVE.yaml',
+        help='no running graph, but one on the slave that this plant describes, in simulated time',
+    )
+    parser.add_argument(
+        '--rig', type=Path, metavar='rig.yaml', help='the rig and its limits (default: as shipped)'
+    )
+    parser.add_argument(
+        '--namespace', default='endoscope', help='of the running graph (default: %(default)s)'
+    )
+    parser.add_argument(
+        '--jobs', type=COUNT, default=2, metavar='N', help='tasks side by side (default 2)'
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Investigate; return 1 if the rig or a person stopped it."""
+    import sys
+    from functools import partial
+
+    from endoscope_bringup.operating.actions import paused_when_interrupted
+    from endoscope_bringup.operating.motion_player import MotionPlayer
+    from endoscope_core.errors import EndoscopeError
+    from endoscope_core.rig import load_rig
+    from endoscope_explain.investigation import page
+    from endoscope_explain.investigation.investigation import (
+        Investigation,
+        explain_together,
+        investigate,
+    )
+    from endoscope_explain.investigation.log import PAGE, Stop, begun
+
+    if not (args.attended or sys.stdin.isatty()):
+        raise EndoscopeError('nobody can be asked for each motion here: give --attended, or a tty')
+    rig = load_rig(args.rig)
+    of = Investigation(args.out, args.plant, rig, args.experiments, args.jobs)
+    begun(of.folder, of.plant_file)
+    say = partial(print, flush=True)
+    consent = (lambda words: True) if args.attended else _asked
+    with _graph(args, rig) as client, paused_when_interrupted(client, moving=True):
+        log = investigate(
+            of,
+            MotionPlayer(client, consent).play,
+            lambda bags: explain_together(bags, of, partial(print, file=sys.stderr, flush=True)),
+            page=lambda log: page.page(log, of.folder),
+            say=say,
+        )
+    say(f'Page: {of.folder / PAGE}')
+    return 1 if log.stopped in (Stop.FAULT, Stop.INTERRUPTED) else 0
+
+
+def _asked(words: str) -> bool:
+    return input(f'{words} [y/N] ').strip().lower() in ('y', 'yes')
+
+
+@contextmanager
+def _graph(args: argparse.Namespace, rig: 'Rig') -> Iterator['GraphClient']:
+    """The running graph, or one on a simulated slave where none runs or none is wanted."""
+    from endoscope_nodes.client.graph_client import joined_graph
+    from endoscope_nodes.client.graph_listener import GraphError
+
+    slave = args.simulate
+    if slave is None:
+        with joined_graph('investigate', args.namespace) as client:
+            try:
+                client.find(LOOKS_S)
+            except GraphError as error:
+                if client.nodes():
+                    raise
+                plant = rig.simulation.plant
+                print(f'{error}; this one is on a slave simulated by {plant or "nominal numbers"}')
+                slave = Path(plant) if plant else None
+            else:
+                yield client
+                return
+    from endoscope_bringup.demo.live_graph import NODES, LiveGraph
+    from endoscope_nodes.nodes.recorder import RecorderNode
+
+    overrides: dict[str, dict[str, object]] = {
+        'motor_driver': {'seed': rig.simulation.seed},
+        'recorder': {'autostart': False},
+    }
+    if slave is not None:
+        overrides['motor_driver']['plant_file'] = str(slave)
+    nodes = (*NODES, RecorderNode)
+    with LiveGraph(None, lock_step=True, overrides=overrides, rig=rig, nodes=nodes) as graph:
+        yield graph.client

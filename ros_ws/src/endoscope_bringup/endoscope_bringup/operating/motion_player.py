@@ -1,0 +1,130 @@
+"""Plays a motion on a running graph, with the operator's consent, and records it."""
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from endoscope_core.errors import OutputError
+from endoscope_explain.investigation.investigation import NotPlayedError, RigStoppedError
+from endoscope_explain.investigation.motions import Motion
+from endoscope_nodes import names
+from endoscope_nodes.client.graph_client import GraphClient
+from endoscope_nodes.client.graph_listener import MASTER, RECORDER, GraphError
+from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
+
+RECORDER_NODE = 'recorder'
+PATIENCE_S = 20.0
+NEXT_WORD_S = 1.5
+"""The console says once a second how far it is; a word from before means nothing."""
+REST_S = 0.5
+"""After a motion, so that what it leaves behind is recorded."""
+AS_COMMANDED = (('compensator', {'mode': 'none'}), ('controller', {'active': False}))
+"""The motors do what the motion asks: the plant's answer to that was found to be safe."""
+
+Consent = Callable[[str], bool]
+"""Asks a person, in words, whether something may be done."""
+
+
+class MotionPlayer:
+    """Plays motions one at a time, each in a motion session of its own.
+
+    A session is opened for a motion that somebody consents to, and ends with it. Whatever ends a
+    motion before its end pauses the graph.
+    """
+
+    def __init__(self, client: GraphClient, consent: Consent) -> None:
+        self._client = client
+        self._consent = consent
+
+    def play(self, motion: Motion, file: Path, bag: Path) -> None:
+        """Play a motion, which a file holds, and record it to a bag that does not exist.
+
+        RigStoppedError if the rig stops on the way, NotPlayedError if nobody consents or a person
+        ends it, GraphError if the graph does not do what it is asked for.
+        """
+        client = self._client
+        self._look()
+        if not self._consent(f'Play this motion: {motion.words}?'):
+            raise NotPlayedError('the motion was not wanted')
+        self._look()
+        with ExitStack() as after:
+            self._as_commanded(after)
+            self._recording(bag, after)
+            try:
+                if client.state != 'ENABLED':
+                    client.ask_and_see('enable', PATIENCE_S)
+                self._played(motion, file)
+            except BaseException:
+                if client.state == 'ENABLED':
+                    client.order('pause')
+                    client.wait_until(lambda: client.state != 'ENABLED', PATIENCE_S)
+                raise
+            client.ask('disable', PATIENCE_S)
+        if not bag.exists():
+            raise OutputError(
+                f'{bag} is not here: the recorder writes on another machine; run this command there'
+            )
+
+    def _look(self) -> None:
+        """Hear how the graph is now: nobody has listened while something was explained."""
+        client = self._client
+        client.find(PATIENCE_S)
+        client.wait_until(lambda: False, NEXT_WORD_S)
+        if client.state == 'FAULT':
+            raise RigStoppedError(f'FAULT: {client.why or "its cause is not known"}')
+
+    def _as_commanded(self, after: ExitStack) -> None:
+        """Let nothing add to the motion, until `after`."""
+        silent: dict[str, Any] = {'source': 'none', 'hold_to_play': False, 'command_file': ''}
+        for node, values in (*AS_COMMANDED, (names.MASTER_NODE, silent)):
+            before = {
+                name: read_parameter(self._client, f'{node}.{name}', PATIENCE_S).value
+                for name in values
+            }
+            # Nothing begins to move by itself once the session is over.
+            if node == names.MASTER_NODE and before['source'] in ('motion', 'file'):
+                before['source'] = 'none'
+            after.callback(set_parameters, self._client, node, before)
+            set_parameters(self._client, node, {k: v for k, v in values.items() if v != ''})
+
+    def _recording(self, bag: Path, after: ExitStack) -> None:
+        """Record to a bag, until `after`."""
+        client = self._client
+        client.wait_until(lambda: RECORDER in client.health, PATIENCE_S)
+        said = client.health.get(RECORDER)
+        if said is not None and said.message == 'recording automatically':
+            client.trigger(names.RECORDER_STOP, PATIENCE_S)
+        before = read_parameter(client, f'{RECORDER_NODE}.bag', PATIENCE_S).value
+        after.callback(set_parameters, client, RECORDER_NODE, {'bag': before})
+        set_parameters(client, RECORDER_NODE, {'bag': str(bag.absolute())})
+        client.trigger(names.RECORDER_START, PATIENCE_S)
+        after.callback(client.trigger, names.RECORDER_STOP, PATIENCE_S)
+
+    def _played(self, motion: Motion, file: Path) -> None:
+        client = self._client
+        path = str(file.absolute())
+        set_parameters(client, names.MASTER_NODE, {'command_file': path, 'source': 'file'})
+        asked_ns = client.graph_ns
+        left = NEXT_WORD_S
+
+        def is_at_its_end() -> bool:
+            said = client.health.get(MASTER)
+            heard = said is not None and said.values[names.FINISHED] == 'True'
+            return heard and client.graph_ns > asked_ns + round(left * 1e9)
+
+        patience_s = motion.duration + PATIENCE_S
+        client.wait_until(lambda: client.state != 'ENABLED' or is_at_its_end(), patience_s)
+        if client.state == 'ENABLED' and not is_at_its_end():
+            raise GraphError(f'the console did not play {file} to its end in {patience_s:.0f} s')
+        client.wait_until(lambda: client.state != 'ENABLED', REST_S)
+        self._require_enabled()
+        set_parameters(client, names.MASTER_NODE, {'source': 'none'})
+
+    def _require_enabled(self) -> None:
+        client = self._client
+        if client.state == 'FAULT':
+            client.wait_until(lambda: bool(client.why), NEXT_WORD_S)
+            raise RigStoppedError(f'FAULT: {client.why or "its cause is not known"}')
+        if client.state != 'ENABLED':
+            raise NotPlayedError(f'the slave is {client.state}: {client.why or "asked for"}')

@@ -1,0 +1,56 @@
+"""index.html: what is known of a rig, and the motions that it was asked for."""
+
+from pathlib import Path
+
+import numpy as np
+
+from endoscope_core.signals.command_file import JOINTS, read_command_file
+from endoscope_explain.investigation.log import Answer, Log, answered, asked, recorded
+from endoscope_pages import Curve, Plot, figure_html, html_table, render_page
+
+COLOURS = ('actual', 'wanted')
+"""Of the curves of the joints, names of look.css."""
+COLUMNS = ('effect', 'joint', 'not told from', 'strength, 90 % interval')
+
+
+def page(log: Log, folder: Path) -> str:
+    """The page of an investigation whose motions are in a folder."""
+    answer = log.last_answer
+    return render_page(
+        'endoscope_explain',
+        'report/templates/investigation.html.j2',
+        log=log,
+        headline='Nothing is known yet' if answer is None else answer.sentence,
+        ended=log.stopped is not None,
+        answer=answer,
+        names='' if answer is None else _names(answer),
+        lines=[] if answer is None else answered(answer)[1 + len(answer.names) :],
+        rounds=[
+            {
+                'round': each,
+                'asked': asked(each),
+                'recorded': recorded(each).replace('`', ''),
+                'answered': [] if each.answer is None else answered(each.answer)[1:-1],
+                'figure': _figure(folder / each.file),
+            }
+            for each in log.rounds
+        ],
+    )
+
+
+def _names(answer: Answer) -> str:
+    rows = [
+        (name.id, name.joint, ', '.join(name.rivals) or 'none', name.strength)
+        for name in answer.names
+    ]
+    return html_table(COLUMNS, rows, words=len(COLUMNS))
+
+
+def _figure(file: Path) -> str:
+    table = read_command_file(file)
+    curves = tuple(
+        Curve(joint, table.time, np.degrees(table.angle[:, k]), COLOURS[k])
+        for k, joint in enumerate(JOINTS)
+        if table.angle[:, k].any()
+    )
+    return figure_html((Plot('Desired angle (deg)', 'time (s)', curves, height=110),))

@@ -1,0 +1,132 @@
+"""`endoscope investigate` through the real nodes, on a simulated slave."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+from endoscope_bags import open_bag
+from endoscope_bringup import cli
+from endoscope_bringup.demo.live_graph import NODES, LiveGraph
+from endoscope_bringup.operating.motion_player import MotionPlayer
+from endoscope_core.physics import PlantDescription, save_plant
+from endoscope_core.rig import shipped_rig
+from endoscope_core.signals import hold, move, sequence
+from endoscope_core.signals.command_file import JOINTS, CommandTable, write_command_file
+from endoscope_explain.investigation.investigation import NotPlayedError, RigStoppedError
+from endoscope_explain.investigation.motions import Motion
+from endoscope_nodes.client.graph_parameters import read_parameter
+from endoscope_nodes.names import SLAVE_COMMAND
+from endoscope_nodes.nodes.recorder import RecorderNode
+
+LARGEST = 0.5
+
+
+@pytest.fixture
+def motion(tmp_path):
+    """A short motion of one joint, and its file."""
+    parts = [move(0.0, LARGEST, 1.0), move(LARGEST, 0.0, 1.0), hold(0.2)]
+    signal = sequence('there and back', parts)
+    time = np.arange(0.0, signal.duration, 0.01)
+    angle = np.stack([signal(time)[0], np.zeros_like(time)], axis=1)
+    file = tmp_path / 'motion.csv'
+    write_command_file(file, time, angle)
+    return Motion('there and back', 'bend_x', '', CommandTable(JOINTS, time, angle)), file
+
+
+def graph(rig=None):
+    """All nodes in simulated time."""
+    overrides = {'recorder': {'autostart': False}}
+    return LiveGraph(
+        None, lock_step=True, overrides=overrides, rig=rig, nodes=(*NODES, RecorderNode)
+    )
+
+
+def test_a_motion_is_played_in_a_session_of_its_own_and_leaves_everything_as_it_was(
+    motion, tmp_path
+):
+    asked = []
+    with graph() as live:
+        client = live.client
+        live.set('console', source='master')
+        player = MotionPlayer(client, lambda words: asked.append(words) or True)
+        player.play(*motion, tmp_path / 'bag')
+        live.advance(1.0)
+        assert client.state == 'DISABLED'
+        assert not client.session
+        assert read_parameter(client, 'compensator.mode').value == 'bouc_wen'
+        assert read_parameter(client, 'console.source').value == 'master'
+        assert abs(live.shafts[0]) < 0.05
+    assert asked == ['Play this motion: There and back of bend_x, 2 s, at most 29 deg?']
+    commands = open_bag(tmp_path / 'bag').joint_state(SLAVE_COMMAND).select(JOINTS)
+    played = commands.require('position')
+    assert played[:, 0].max() == pytest.approx(LARGEST, abs=0.01)
+    assert np.abs(played[:, 1]).max() < 0.05
+
+
+def test_without_consent_nothing_moves(motion, tmp_path):
+    with graph() as live:
+        with pytest.raises(NotPlayedError):
+            MotionPlayer(live.client, lambda words: False).play(*motion, tmp_path / 'bag')
+        live.advance(0.5)
+        assert live.client.state == 'DISABLED'
+    assert not (tmp_path / 'bag').exists()
+
+
+def test_a_fault_is_told_with_its_cause_and_what_was_recorded_stays(motion, tmp_path):
+    rig = shipped_rig()
+    rig = dataclasses.replace(rig, tension=dataclasses.replace(rig.tension, ceiling=6.0))
+    with graph(rig) as live:
+        player = MotionPlayer(live.client, lambda words: True)
+        with pytest.raises(RigStoppedError, match='tension'):
+            player.play(*motion, tmp_path / 'bag')
+        assert live.client.state == 'FAULT'
+        with pytest.raises(RigStoppedError, match='FAULT'):
+            player.play(*motion, tmp_path / 'another')
+    assert open_bag(tmp_path / 'bag').joint_state(SLAVE_COMMAND).stamp_ns.size
+
+
+def test_an_interruption_pauses_the_graph(motion, tmp_path):
+    with graph() as live:
+        client = live.client
+        inner, heard = client.serve, []
+
+        def interrupted(seconds):
+            heard.append(client.state)
+            if heard.count('ENABLED') == 20:
+                raise KeyboardInterrupt
+            return inner(seconds)
+
+        client.serve = interrupted
+        with pytest.raises(KeyboardInterrupt):
+            MotionPlayer(client, lambda words: True).play(*motion, tmp_path / 'bag')
+        assert client.state == 'PAUSED'
+        live.advance(0.5)
+        assert read_parameter(client, 'console.source').value == 'none'
+    assert open_bag(tmp_path / 'bag').joint_state(SLAVE_COMMAND).stamp_ns.size
+
+
+def test_without_a_person_to_ask_it_does_not_begin(tmp_path, capsys):
+    save_plant(PlantDescription(), tmp_path / 'plant.yaml')
+    words = ['investigate', '--plant', str(tmp_path / 'plant.yaml'), '--out', str(tmp_path / 'out')]
+    assert cli.main(words) == 2
+    assert '--attended' in capsys.readouterr().err
+    assert not (tmp_path / 'out').exists()
+
+
+def test_a_rig_as_described_is_explained_by_one_motion(tmp_path, capfd):
+    plant, out = tmp_path / 'plant.yaml', tmp_path / 'out'
+    save_plant(PlantDescription(), plant)
+    words = ['investigate', '--plant', str(plant), '--simulate', str(plant), '--attended']
+    assert cli.main([*words, '--out', str(out)]) == 0
+    log = json.loads((out / 'log.json').read_text())
+    assert log['stopped'] == 'one_class_left'
+    (only,) = log['rounds']
+    assert only['answer']['names'] == []
+    assert only['answer']['improved'] < 1.3
+    assert (out / 'plant.yaml').exists()
+    assert 'Commissioning of bend_x and bend_y' in (out / 'index.html').read_text()
+    # It is at its end, and says so.
+    assert cli.main([*words, '--out', str(out)]) == 2
+    assert 'at its end' in capfd.readouterr().err
