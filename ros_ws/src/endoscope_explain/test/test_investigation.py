@@ -17,6 +17,7 @@ from endoscope_explain.investigation.investigation import (
     Investigation,
     NotPlayedError,
     RigStoppedError,
+    explain_inputs,
     investigate,
 )
 from endoscope_explain.investigation.log import LOG_JSON, LOG_MD, PLANT, Stop, begun
@@ -26,8 +27,7 @@ from endoscope_explain.investigation.motions import (
     commissioning,
     require_allowed,
 )
-from endoscope_explain.pipeline import Inputs, Sources, explain_case
-from endoscope_explain.shared_physics import physics_of_inputs
+from endoscope_explain.pipeline import Inputs, Sources
 
 TO_ONE_SIDE = sequence(
     'to one side', [hold(1.0), move(0.0, 0.9, 2.0), hold(1.5, 0.9), move(0.9, 0.0, 2.0), hold(1.0)]
@@ -70,13 +70,7 @@ class SimulatedRig:
             )
             for bag in bags
         ]
-        if len(bags) > 1:
-            given = physics_of_inputs(inputs, 2, lambda _: None)
-            inputs = [
-                dataclasses.replace(one, sources=dataclasses.replace(one.sources, given=own))
-                for one, own in zip(inputs, given, strict=True)
-            ]
-        return [explain_case(one, jobs=2) for one in inputs]
+        return explain_inputs(inputs, 2)
 
 
 @pytest.fixture

@@ -26,11 +26,11 @@ from endoscope_explain.investigation.motions import (
     of_experiment,
     require_allowed,
 )
-from endoscope_explain.many_bags import explained_cases
 from endoscope_explain.observe.predicted_signals import fits_by, view
-from endoscope_explain.pipeline import Progress, Sources
+from endoscope_explain.pipeline import Inputs, Progress, Sources, explain_case, read_inputs
 from endoscope_explain.report.numbers import shown
 from endoscope_explain.report.sentences import verdict_sentence
+from endoscope_explain.shared_physics import physics_of_inputs
 
 EXPERIMENTS = 4
 
@@ -68,11 +68,23 @@ class Investigation:
 def explain_together(
     bags: Sequence[Path], investigation: Investigation, progress: Progress | None = None
 ) -> list[ExplainedCase]:
+    """Explain bags of one rig, as `explain_inputs` does; BagError if one cannot be used."""
+    plant, file = investigation.plant, investigation.plant_file
+    inputs = [read_inputs(Sources(bag, plant, quick=True, plant_file=file)) for bag in bags]
+    return explain_inputs(inputs, investigation.jobs, progress)
+
+
+def explain_inputs(
+    inputs: Sequence[Inputs], jobs: int, progress: Progress | None = None
+) -> list[ExplainedCase]:
     """Explain recordings of one rig: one by itself, several by what all of them need."""
-    plant = investigation.plant
-    sources = [Sources(bag, plant, quick=True, plant_file=investigation.plant_file) for bag in bags]
-    together = len(bags) > 1
-    return explained_cases(sources, investigation.jobs, same_physics=together, progress=progress)
+    if len(inputs) > 1:
+        all_given = physics_of_inputs(inputs, jobs, progress or (lambda _: None))
+        inputs = [
+            replace(one, sources=replace(one.sources, given=given))
+            for one, given in zip(inputs, all_given, strict=True)
+        ]
+    return [explain_case(one, jobs=jobs, progress=progress) for one in inputs]
 
 
 def investigate(
