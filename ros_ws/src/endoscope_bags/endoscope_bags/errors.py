@@ -4,19 +4,11 @@ from endoscope_core.errors import EndoscopeError
 
 
 class BagError(EndoscopeError):
-    """Base of all errors of this package; the message is one line that names the thing."""
+    """A recording cannot be used; the message is one line that names the thing and why."""
 
 
 class BagNotFoundError(BagError, FileNotFoundError):
     """There is no file or folder of that name, or a file that the metadata lists is missing."""
-
-
-class NotABagError(BagError):
-    """The file or folder is something else."""
-
-
-class EmptyBagError(BagError):
-    """The recording holds no message."""
 
 
 class CorruptBagError(BagError):
@@ -29,10 +21,6 @@ class BagExistsError(BagError, FileExistsError):
 
 class BagWriteError(BagError):
     """The disk does not take the recording; what was recorded until then is kept."""
-
-
-class MissingTopicError(BagError):
-    """The recording lacks a topic that is needed."""
 
 
 class MalformedMessageError(BagError):

@@ -19,7 +19,7 @@ from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 from mcap.records import Channel, DataEnd, Footer, Header, Metadata, Schema, Statistics
 
-from endoscope_bags.errors import BagNotFoundError, CorruptBagError, NotABagError
+from endoscope_bags.errors import BagError, BagNotFoundError, CorruptBagError
 from endoscope_bags.mcap_records import (
     MAGIC,
     MESSAGE_HEAD,
@@ -106,16 +106,16 @@ def scan_mcap(path: str | Path, *, salvage: bool = False) -> McapScan:
     with path.open('rb') as file:
         size = path.stat().st_size
         if size == 0:
-            raise NotABagError(f'{path}: empty file, not an MCAP recording')
+            raise BagError(f'{path}: empty file, not an MCAP recording')
         # Damage may hit the first bytes, too; what is no recording shows by having no records.
         first = file.read(_LOOKED_AT)
         if not first.startswith(MAGIC) and not salvage:
             if _is_text(first):
-                raise NotABagError(
+                raise BagError(
                     f'{path}: text, no recording; a table of measurements is converted first: '
                     f'endoscope convert {path} --propose mapping.yaml'
                 )
-            raise NotABagError(f'{path}: not an MCAP recording (wrong first bytes)')
+            raise BagError(f'{path}: not an MCAP recording (wrong first bytes)')
         with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
             return _Pass(path, data, salvage).run()
 
@@ -191,7 +191,7 @@ class _Pass:
         self._end_loose_messages(position)
         self._settle()
         if not (whole_head or len(self.scan.messages)):
-            raise NotABagError(f'{self.scan.path}: not an MCAP recording (wrong first bytes)')
+            raise BagError(f'{self.scan.path}: not an MCAP recording (wrong first bytes)')
         return self.scan
 
     def _record(self, position: int) -> tuple[int, int, int] | None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-from endoscope_bags.errors import BagError, BagNotFoundError, NotABagError
+from endoscope_bags.errors import BagError, BagNotFoundError
 from endoscope_bags.message_types import MessageType
 from endoscope_bags.topic import QosProfile
 from endoscope_core.atomic_output import write_text
@@ -34,7 +34,7 @@ def bag_files(path: Path) -> list[Path]:
     if not (path / METADATA).is_file():
         found = sorted(path.glob('*.mcap')) or sorted(path.glob('*.db3'))
         if not found:
-            raise NotABagError(
+            raise BagError(
                 f'{path}: a folder with neither metadata.yaml nor any .mcap or .db3 in it'
             )
         return found
@@ -51,11 +51,11 @@ def _listed_files(path: Path) -> list[str]:
     try:
         document = load_yaml(path)
     except FileError as error:
-        raise NotABagError(str(error)) from error
+        raise BagError(str(error)) from error
     information = document.get(_ROOT) if isinstance(document, dict) else None
     listed = information.get('relative_file_paths') if isinstance(information, dict) else None
     if not isinstance(information, dict) or not listed:
-        raise NotABagError(f'{path}: not the metadata of a rosbag2 recording')
+        raise BagError(f'{path}: not the metadata of a rosbag2 recording')
     storage = information.get('storage_identifier')
     compression = information.get('compression_mode') or 'none'
     if storage not in ('mcap', 'sqlite3') or str(compression).lower() != 'none':
@@ -65,12 +65,10 @@ def _listed_files(path: Path) -> list[str]:
             'recorded (ros2 bag convert)'
         )
     if not isinstance(listed, list) or not all(isinstance(name, str) for name in listed):
-        raise NotABagError(
-            f'{path}: relative_file_paths is {listed!r}: it has to list names of files'
-        )
+        raise BagError(f'{path}: relative_file_paths is {listed!r}: it has to list names of files')
     names = [Path(name).name for name in listed]
     if len(set(names)) < len(names):
-        raise NotABagError(f'{path}: relative_file_paths lists a file twice')
+        raise BagError(f'{path}: relative_file_paths lists a file twice')
     return names
 
 

@@ -13,9 +13,7 @@ from endoscope_bags.cdr_decoding import HEAD_WITH_STAMP, QUANTITIES, Payloads, s
 from endoscope_bags.errors import (
     BagError,
     CorruptBagError,
-    EmptyBagError,
     MalformedMessageError,
-    MissingTopicError,
     UnknownTypeError,
 )
 from endoscope_bags.joint_state_series import (
@@ -176,14 +174,12 @@ class Recording:
 
         Raises
         ------
-        MissingTopicError
-            No topic with messages has this name.
         BagError
-            Topics under several namespaces have it.
+            No topic with messages has this name, or topics under several namespaces have it.
         """
         matches = self._matches(suffix, namespace)
         if not matches:
-            raise MissingTopicError(self.lacking(suffix, namespace=namespace))
+            raise BagError(self.lacking(suffix, namespace=namespace))
         if len(matches) > 1:
             raise BagError(
                 f'{self.path}: {suffix} could be {" or ".join(matches)}; give the namespace'
@@ -237,12 +233,11 @@ class Recording:
 
         Raises
         ------
-        MissingTopicError
-            No topic with messages has this name.
         MalformedMessageError
             A message does not decode.
         BagError
-            Several topics have this name, it is not a JointState, or a number is NaN or infinite.
+            None or several topics with messages have this name, it is not a JointState, or a
+            number is NaN or infinite.
         """
         if order not in ('stamp', 'recorded'):
             raise ValueError(f"order is 'stamp' or 'recorded', not {order!r}")
@@ -410,9 +405,10 @@ def open_bag(path: str | Path, *, salvage: bool = False) -> Recording:
 
     Raises
     ------
-    BagNotFoundError, NotABagError, EmptyBagError, CorruptBagError, BagError
-        All of them are a `BagError`, which itself is raised for formats that are not read; the
-        message names the file and what to do.
+    BagNotFoundError, CorruptBagError, BagError
+        The first two are a `BagError` as well, which itself is raised for what is no recording,
+        holds no message or has a format that is not read; the message names the file and what to
+        do.
     """
     path = Path(path)
     scans: list[Scan] = [
@@ -425,7 +421,7 @@ def open_bag(path: str | Path, *, salvage: bool = False) -> Recording:
             raise BagError(f'{scan.path}: message encoding {foreign.pop()!r} instead of cdr')
     recording = Recording(path, scans, salvage)
     if not recording.message_count:
-        raise EmptyBagError(f'{path}: holds no message')
+        raise BagError(f'{path}: holds no message')
     return recording
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from mcap.records import Channel, Header, Schema
 
-from endoscope_bags.errors import BagNotFoundError, CorruptBagError, NotABagError, UnknownTypeError
+from endoscope_bags.errors import BagError, BagNotFoundError, CorruptBagError, UnknownTypeError
 from endoscope_bags.mcap_scan import IntArray, Messages
 from endoscope_bags.message_types import message_type
 from endoscope_bags.unpacking import LARGEST_CHUNK
@@ -88,7 +88,7 @@ def scan_sqlite3(path: str | Path, *, salvage: bool = False) -> Sqlite3Scan:
     except OSError as error:
         raise BagNotFoundError(f'{path}: {error.strerror}') from error
     if not head.startswith(_MAGIC):
-        raise NotABagError(f'{path}: not an sqlite3 recording (wrong first bytes)')
+        raise BagError(f'{path}: not an sqlite3 recording (wrong first bytes)')
     _check_length(path, head)
     scan = Sqlite3Scan(path)
     with closing(_connected(path)) as file:
@@ -140,7 +140,7 @@ def _read_topics(file: sqlite3.Connection, scan: Sqlite3Scan) -> dict[int, int]:
         if str(sql).upper().startswith('CREATE TABLE')
     }
     if not {'topics', 'messages'} <= tables:
-        raise NotABagError(f'{scan.path}: a database that is not a rosbag2 recording')
+        raise BagError(f'{scan.path}: a database that is not a rosbag2 recording')
     has = {str(column[1]) for column in file.execute('PRAGMA table_info(topics)')}
     chosen = [
         name if name in has else "''" for name in ('offered_qos_profiles', 'type_description_hash')

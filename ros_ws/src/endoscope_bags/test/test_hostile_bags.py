@@ -12,7 +12,7 @@ from mcap.writer import CompressionType, Writer
 from endoscope_bags import BagError, BagWriter, open_bag
 from endoscope_bags.cdr_encoding import encode_joint_state, encode_string
 from endoscope_bags.copying import recover
-from endoscope_bags.errors import MalformedMessageError, NotABagError
+from endoscope_bags.errors import MalformedMessageError
 from endoscope_bags.information import bag_information
 from endoscope_bags.mcap_records import MAGIC
 from endoscope_bags.message_types import JOINT_STATE, STRING
@@ -312,7 +312,7 @@ def test_messages_outside_chunks_are_found_again_behind_a_gap(path, tmp_path):
 
 def test_the_first_bytes_are_no_reason_to_lose_the_rest(path, tmp_path, whole):
     path.write_bytes(bytes(8) + whole[8:])
-    with pytest.raises(NotABagError):
+    with pytest.raises(BagError):
         open_bag(path)
     assert recover(path, tmp_path / 'out').message_count == N
 

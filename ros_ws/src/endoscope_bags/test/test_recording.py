@@ -17,10 +17,7 @@ from endoscope_bags.cdr_encoding import (
 from endoscope_bags.errors import (
     BagNotFoundError,
     CorruptBagError,
-    EmptyBagError,
     MalformedMessageError,
-    MissingTopicError,
-    NotABagError,
 )
 from endoscope_bags.message_types import (
     DIAGNOSTIC_ARRAY,
@@ -66,7 +63,7 @@ def test_any_namespace_and_joint_order(tmp_path):
 def test_a_suffix_matches_whole_names_only(tmp_path):
     bag = open_bag(write(tmp_path / 'bag', topic='/fast_motor/measured_js', n=1))
     assert not bag.has('motor/measured_js')
-    with pytest.raises(MissingTopicError, match='lacks topic motor/measured_js; it has /fast_'):
+    with pytest.raises(BagError, match='lacks topic motor/measured_js; it has /fast_'):
         bag.joint_state('motor/measured_js')
 
 
@@ -215,10 +212,10 @@ def test_what_is_no_bag_is_named(tmp_path):
     (tmp_path / 'folder').mkdir()
     for name, error, what in (
         ('absent', BagNotFoundError, 'absent: no such file or folder'),
-        ('empty.mcap', NotABagError, 'empty.mcap: empty file'),
-        ('text.mcap', NotABagError, 'text.mcap: text, no recording'),
-        ('noise.mcap', NotABagError, 'noise.mcap: not an MCAP recording'),
-        ('folder', NotABagError, 'neither metadata.yaml nor any .mcap'),
+        ('empty.mcap', BagError, 'empty.mcap: empty file'),
+        ('text.mcap', BagError, 'text.mcap: text, no recording'),
+        ('noise.mcap', BagError, 'noise.mcap: not an MCAP recording'),
+        ('folder', BagError, 'neither metadata.yaml nor any .mcap'),
     ):
         with pytest.raises(error, match=what) as raised:
             open_bag(tmp_path / name)
@@ -229,16 +226,16 @@ def test_what_is_no_bag_is_named(tmp_path):
 def test_a_recording_without_messages_is_said(tmp_path):
     with BagWriter(tmp_path / 'bag') as writer:
         writer.add_topic('/a', STRING)
-    with pytest.raises(EmptyBagError, match='bag: holds no message'):
+    with pytest.raises(BagError, match='bag: holds no message'):
         open_bag(tmp_path / 'bag')
 
 
 @pytest.mark.parametrize(
     ('text', 'error', 'what'),
     [
-        ('a: [', NotABagError, 'is not YAML'),
-        ('a: 1', NotABagError, 'not the metadata of a rosbag2'),
-        ('', NotABagError, 'not the metadata of a rosbag2'),
+        ('a: [', BagError, 'is not YAML'),
+        ('a: 1', BagError, 'not the metadata of a rosbag2'),
+        ('', BagError, 'not the metadata of a rosbag2'),
     ],
 )
 def test_metadata_that_are_none(tmp_path, text, error, what):
@@ -315,9 +312,9 @@ def test_a_topic_without_a_message_is_said_to_be_empty(tmp_path):
         wires = encode_joint_state(['w'], 0, effort=[1.0])
         writer.write_raw('/a/wires/measured_js', JOINT_STATE, wires, 0)
     bag = open_bag(tmp_path / 'bag')
-    with pytest.raises(MissingTopicError, match=r'no message was recorded on /a/motor/servo_jp$'):
+    with pytest.raises(BagError, match=r'no message was recorded on /a/motor/servo_jp$'):
         bag.joint_state('motor/servo_jp')
-    with pytest.raises(MissingTopicError, match=r'lacks topic wires/measured_js; it has /a/wires'):
+    with pytest.raises(BagError, match=r'lacks topic wires/measured_js; it has /a/wires'):
         bag.joint_state('wires/measured_js', namespace='/b')
     assert bag.lacking('motor/servo_jp', 'slave/servo_jp').endswith(
         ': no message was recorded on /a/motor/servo_jp; '

@@ -10,7 +10,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from endoscope_bags import BagError, open_bag
 from endoscope_bags.cdr_encoding import encode_joint_state, encode_string
 from endoscope_bags.copying import recover
-from endoscope_bags.errors import CorruptBagError, EmptyBagError, NotABagError
+from endoscope_bags.errors import CorruptBagError
 from endoscope_bags.information import bag_information
 from endoscope_bags.message_types import JOINT_STATE, STRING, typestore
 
@@ -86,17 +86,17 @@ def test_it_becomes_an_mcap(tmp_path):
 @pytest.mark.parametrize(
     ('statement', 'error', 'what'),
     [
-        ('DROP TABLE messages', NotABagError, 'a database that is not a rosbag2 recording'),
+        ('DROP TABLE messages', BagError, 'a database that is not a rosbag2 recording'),
         (
             (
                 'ALTER TABLE messages RENAME TO m; CREATE VIEW messages AS WITH RECURSIVE n(x) AS '
                 '(SELECT 1 UNION ALL SELECT x + 1 FROM n) SELECT x AS id, 1 AS topic_id, x AS '
                 "timestamp, x'00' AS data FROM n"
             ),
-            NotABagError,
+            BagError,
             'a database that is not a rosbag2 recording',
         ),
-        ('DELETE FROM messages', EmptyBagError, 'holds no message'),
+        ('DELETE FROM messages', BagError, 'holds no message'),
         ('UPDATE messages SET timestamp = -1 WHERE id = 9', CorruptBagError, 'timed -1 ns'),
         ("UPDATE messages SET timestamp = 'x' WHERE id = 9", CorruptBagError, 'row 9'),
         ("UPDATE messages SET data = 'text' WHERE id = 9", CorruptBagError, 'row 9'),
@@ -143,5 +143,5 @@ def test_what_lies_before_a_damaged_page_is_saved(tmp_path):
 
 def test_what_only_has_the_name_is_one_line(tmp_path):
     (tmp_path / 'bag.db3').write_bytes(b'something else')
-    with pytest.raises(NotABagError, match='not an sqlite3 recording'):
+    with pytest.raises(BagError, match='not an sqlite3 recording'):
         open_bag(tmp_path / 'bag.db3')

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_bags.errors import BagError, MissingTopicError
+from endoscope_bags.errors import BagError
 from endoscope_bags.information import losses_told
 from endoscope_bags.joint_state_series import JointStateSeries
 from endoscope_bags.recording import Recording as Bag
@@ -250,7 +250,7 @@ def recording_from_bag(
     lacking += [] if commanded else [COMMAND]
     fatal = [t for t in lacking if t not in without and t not in OPTIONAL]
     if fatal:
-        raise MissingTopicError(_lacking_message(bag, fatal, namespace))
+        raise BagError(_lacking_message(bag, fatal, namespace))
     notes = [f'{t} was not recorded' for t in lacking]
 
     def read(topic: str, quantity: str) -> JointStateSeries:

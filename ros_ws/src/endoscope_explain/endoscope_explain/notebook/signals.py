@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from endoscope_bags import open_bag
-from endoscope_bags.errors import MissingTopicError
+from endoscope_bags.errors import BagError
 from endoscope_bags.message_types import JOINT_STATE
 from endoscope_core.errors import EndoscopeError, nearest
 from endoscope_explain.recording import MOTOR, WIRES
@@ -43,7 +43,7 @@ _COLOURS = ('#2f6fb7', '#b3261e', '#136b4f', '#a15c00', '#52606d', '#7b3fa0')
 
 
 class UnknownSignalError(EndoscopeError, KeyError):
-    """A name that no signal of the recording has."""
+    """A name that no signal of the recording has; a KeyError, as a mapping's `in` needs one."""
 
 
 @dataclass(frozen=True)
@@ -228,9 +228,7 @@ def read(bag: str | Path, *, namespace: str | None = None) -> Signals:
         if recorded.has(topic, namespace)
     }
     if not series:
-        raise MissingTopicError(
-            f'{path}: holds no joint states; it has {", ".join(recorded.topics)}'
-        )
+        raise BagError(f'{path}: holds no joint states; it has {", ".join(recorded.topics)}')
     origin_ns = min(int(one.stamp_ns[0]) for one in series.values())
     found = {}
     for topic, one in series.items():
