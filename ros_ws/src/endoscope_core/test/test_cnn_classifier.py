@@ -120,7 +120,7 @@ def test_eight_strides_of_three_leave_one_feature_vector():
     np.testing.assert_allclose(found.none, 1.0 / (1.0 + np.exp(-0.5)))
 
 
-def test_intervals_hold_the_share_that_they_promise_and_known_tubes_pass():
+def test_intervals_hold_their_nominal_share_and_known_tubes_pass():
     generator = np.random.default_rng(0)
     true, deviation = generator.random(4000), 0.1 + generator.random(4000)
     error = 3.0 * deviation * generator.standard_normal(4000)

@@ -95,7 +95,7 @@ def test_the_inverse_of_prandtl_ishlinskii_is_exact(weights, first, turning_poin
 @pytest.mark.parametrize('name', SAFE)
 @given(st.lists(st.floats(-1.7, 1.7), min_size=2, max_size=30))
 @settings(max_examples=20)
-def test_inverses_keep_to_the_slope_that_they_promise(name, points):
+def test_inverses_keep_to_the_slope_that_they_state(name, points):
     inverse = inverse_of(SAFE[name], 0.3, points[0])
     assert SAFE[name].inverse_slope <= GREATEST_INVERSE_SLOPE
     before, angle = inverse.command(), points[0]

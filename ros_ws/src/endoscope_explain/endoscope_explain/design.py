@@ -387,7 +387,7 @@ def rival_plant(
     ways = directions(behind, terms, 1)
     if not ways:
         return None
-    # Beside numbers that are bent by what was taken out, a rival may promise nothing at its starts.
+    # Beside numbers that are bent by what was taken out, a rival may gain nothing at its starts.
     ranked = screened(behind, ways) or [ways[0].term]
     packed = ranked[0].added_to(behind.fit.model).base
     term = replace(bare, effects=(*others, spec_of(describe(rival), effect.joint, packed)))

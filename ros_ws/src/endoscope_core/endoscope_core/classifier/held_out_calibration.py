@@ -170,7 +170,7 @@ def calibrated(
 ) -> tuple[CnnClassifier, dict[str, dict[str, float]]]:
     """Calibrate a network on `held_out` rigs, half of them like each instrument that it is to know.
 
-    What is promised holds for each of them (Vovk, Lindsay, Nouretdinov and Gammerman, Mondrian
+    The coverage holds for each of them (Vovk, Lindsay, Nouretdinov and Gammerman, Mondrian
     confidence machine, 2003): limits are those of the instrument that needs the wider ones.
     """
     unlimited = HeldOutCalibration(1.0, np.inf, np.inf)

@@ -236,7 +236,7 @@ def fit_model(recordings: Sequence[Recording], seed: int = 0, model: str = 'bouc
     # For given shape and initial memory, the gain, the lag and an offset for each recording enter
     # linearly and follow from bounded least squares (variable projection, Golub and Pereyra 1973):
     # one to six unknowns are left. Differential evolution (Storn and Price 1997) needs no start and
-    # does not stay in the local minima that sharpness and travel make; L-BFGS-B then polishes.
+    # does not stay in the local minima that sharpness and travel make; L-BFGS-B then refines it.
     found = differential_evolution(
         cost,
         [*family.shape_bounds, *[(-1.0, 1.0)] * len(starts)],

@@ -184,7 +184,7 @@ def delay_slope(series: Series) -> tuple[float, float] | None:
         time = series.time[quickest] - series.time[quickest].mean()
         slope = float(time @ delay[quickest] / (time @ time))
         rest = delay[quickest] - delay[quickest].mean() - slope * time
-        # Rounding of receipt times would otherwise promise a precision that nobody has.
+        # Rounding of receipt times would otherwise pass for a precision that nobody has.
         error = max(float(np.std(rest, ddof=2)), 1e-6) / float(np.sqrt(time @ time))
     return slope, error
 

@@ -98,13 +98,13 @@ def _nominal(name: str, estimate: NominalEstimate, band: float) -> dict[str, Any
 
 
 def _ladder(case: ExplainedCase) -> dict[str, Any]:
-    fit = _rungs(case.ladder)
+    fit = _compared(case.ladder)
     if case.validation:
-        fit['validation'] = {'recording': case.validation_name, **_rungs(case.validation)}
+        fit['validation'] = {'recording': case.validation_name, **_compared(case.validation)}
     return fit
 
 
-def _rungs(ladder: Ladder) -> dict[str, Any]:
+def _compared(ladder: Ladder) -> dict[str, Any]:
     return {
         fits: {
             signal: {'rmse': fit.rmse, 'noise': fit.noise, 'rmse_over_noise': fit.ratio}

@@ -53,25 +53,25 @@ def starts_of(name):
     return tuple(Term(CATALOGUE[name], start) for start in starting_points(CATALOGUE[name]))
 
 
-def promised(found, name):
+def screened_terms(found, name):
     behind = background(found)
     return screened(behind, directions(behind, starts_of(name), 1))
 
 
-def test_a_disturbance_in_the_opposite_phase_is_promised_there(references):
+def test_a_disturbance_in_the_opposite_phase_is_screened_there(references):
     hidden = effect('breathing', moment_nm=0.0006, frequency_hz=0.3, phase_rad=-2.5)
     refitted, _ = references(hidden)
     near = [
         p.start['phase_rad']
-        for p in promised(refitted, 'breathing')
+        for p in screened_terms(refitted, 'breathing')
         if p.start['frequency_hz'] == pytest.approx(0.3)
     ]
     assert np.cos(near[0] + 2.5) > 0.0
 
 
-def test_a_limit_is_promised_as_it_stands_and_not_where_nothing_reaches_it(references):
+def test_a_limit_is_screened_as_it_stands_and_not_where_nothing_reaches_it(references):
     _, described = references(effect('torque_limit', limit_nm=0.01))
-    found = promised(described, 'torque_limit')
+    found = screened_terms(described, 'torque_limit')
     assert found[0].start['limit_nm'] == pytest.approx(0.01, rel=0.05)
     reached = [p.start['limit_nm'] for p in found]
     assert max(reached) < 0.03

@@ -140,19 +140,19 @@ class CompensatorNode(EndoscopeNode):
         found = findings_of(message)
         if found is None and not is_of_no_class(message):
             return
-        crowd = self._results.rivals()
-        if crowd:
-            self._doubt_results(crowd)
-        if crowd or not self._calibrated_in or message.header.frame_id != self._calibrated_in:
-            why = crowd or f'it is of {message.header.frame_id or "no session"}'
+        rivals = self._results.rivals()
+        if rivals:
+            self._doubt_results(rivals)
+        if rivals or not self._calibrated_in or message.header.frame_id != self._calibrated_in:
+            why = rivals or f'it is of {message.header.frame_id or "no session"}'
             self.get_logger().warning(f'{names.CALIBRATION_RESULT} is not taken: {why}')
             return
         self._found, self._news = found, True
 
-    def _doubt_results(self, crowd: str) -> None:
+    def _doubt_results(self, rivals: str) -> None:
         """Take no result before another calibration: it may be somebody else's."""
         self._calibrated_in = ''
-        self._session.leave(crowd)
+        self._session.leave(rivals)
 
     def _take_news(self) -> None:
         """Put a new calibration in force: only where nothing moves."""

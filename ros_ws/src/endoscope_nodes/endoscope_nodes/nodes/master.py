@@ -157,9 +157,9 @@ class MasterNode(EndoscopeNode):
             self._clutch_out = None
 
     def _on_handle(self, sample: JointSample) -> None:
-        crowd = self._handle_senders.rivals()
-        if crowd:
-            self._session.leave(crowd)
+        rivals = self._handle_senders.rivals()
+        if rivals:
+            self._session.leave(rivals)
             return
         self._handle_ns = self.ticker.hand_ns()
         refused = self._handle.take(sample.stamp_ns, sample.position, self.ticker.monotonic_ns())
@@ -194,9 +194,9 @@ class MasterNode(EndoscopeNode):
 
     def _on_result(self, message: DiagnosticArray) -> None:
         """Keep to what this session's own calibration found out about the tube's range."""
-        crowd = self._results.rivals()
-        if crowd:
-            self._session.leave(crowd)
+        rivals = self._results.rivals()
+        if rivals:
+            self._session.leave(rivals)
         if not self._session.belongs(message.header.frame_id):
             return
         found = findings_of(message)

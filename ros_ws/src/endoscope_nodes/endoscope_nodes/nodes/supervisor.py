@@ -109,8 +109,8 @@ class SupervisorNode(EndoscopeNode):
         deserted = self.machine.session and not self.count_publishers(names.MOTOR_COMMAND)
         self._note('compensator', f'nobody sends {names.MOTOR_COMMAND}' if deserted else '')
         for topic in self._watched:
-            crowded = self.count_publishers(topic) > 1
-            self._note(f'senders of {topic}', senders_in_words(self, topic) if crowded else '')
+            rivals = self.count_publishers(topic) > 1
+            self._note(f'senders of {topic}', senders_in_words(self, topic) if rivals else '')
 
     def _note(self, name: str, trouble: str) -> None:
         if not trouble:

@@ -85,11 +85,11 @@ class SessionWatch:
         return self._session.name
 
     def senders_of(
-        self, subscription: Subscription, on_crowd: Callable[[str], None] | None = None
+        self, subscription: Subscription, on_rivals: Callable[[str], None] | None = None
     ) -> SenderWatch:
-        """Watch who sends on a topic: a second one ends the node's part, by `on_crowd` if given."""
+        """Watch who sends on a topic: a second one ends the node's part, by `on_rivals`."""
         senders = SenderWatch(self._node, subscription)
-        self._streams.append((senders, on_crowd or self.leave))
+        self._streams.append((senders, on_rivals or self.leave))
         return senders
 
     def obeys(self, topic: str, gate: CommandGate) -> None:
@@ -101,10 +101,10 @@ class SessionWatch:
         for topic, gate in self._gates:
             if self.name and gate.unheeded:
                 self.leave(f'{topic}: {gate.unheeded}')
-        for senders, on_crowd in self._streams:
-            crowd = senders.rivals()
-            if crowd:
-                on_crowd(crowd)
+        for senders, on_rivals in self._streams:
+            rivals = senders.rivals()
+            if rivals:
+                on_rivals(rivals)
 
     def belongs(self, session: str) -> bool:
         """Whether a message that names this session is of the one that the node takes part in."""
@@ -178,10 +178,10 @@ class CommandInput:
         if not self._session.belongs(sample.session):
             self._gate.refuse(Refusal.SESSION, sample.session or 'none named')
             return
-        crowd = self._senders.rivals()
-        if crowd:
-            self._gate.refuse(Refusal.SENDER, crowd)
-            self._session.leave(crowd)
+        rivals = self._senders.rivals()
+        if rivals:
+            self._gate.refuse(Refusal.SENDER, rivals)
+            self._session.leave(rivals)
             return
         self._take(sample)
 
@@ -207,15 +207,15 @@ class ClutchWatch:
         subscription = node.create_subscription(Joy, MASTER_CLUTCH, self._receive, EVENT)
         self._senders = session.senders_of(subscription, self._doubt)
 
-    def _doubt(self, crowd: str) -> None:
+    def _doubt(self, rivals: str) -> None:
         self._doubted = True
         self._pressed = False
-        self._session.leave(crowd)
+        self._session.leave(rivals)
 
     def _receive(self, message: Joy) -> None:
-        crowd = self._senders.rivals()
-        if crowd:
-            self._doubt(crowd)
+        rivals = self._senders.rivals()
+        if rivals:
+            self._doubt(rivals)
             return
         before = self._pressed
         pressed = bool(message.buttons) and message.buttons[0] == 1
