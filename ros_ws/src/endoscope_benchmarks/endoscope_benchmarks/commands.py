@@ -81,6 +81,17 @@ BENCHES: dict[str, Bench] = {
             _seconds(10.0, 'length of each run in many processes, 0 for none', '--process-seconds'),
         ),
     ),
+    'kept': Bench(
+        'kept_messages',
+        'what it costs the recorder to keep the last 20 s in memory',
+        'Runs all nodes in one process in lock-step, 1000 ticks a second, with a recorder that '
+        'hears nothing, hears all, keeps the last 20 s, records, and does both, and prints the least '
+        'CPU time of a second of motion. Exits 1 where keeping costs more than 3 % of a core.',
+        (
+            _seconds(20.0, 'of simulated motion of each run'),
+            _option('--rounds', 'of the five runs (default: 3)', type=COUNT, default=3),
+        ),
+    ),
     'console': Bench(
         'console.console',
         'how soon the slave stops whatever happens to the page, and what the console costs',

@@ -45,7 +45,7 @@ TARGET_LOCK_STEP = 2.0
 _SETTLING_S = 2.0
 # Before the queue of a thousand commands is full.
 _MOVING_S = 0.5
-_SIMULATED = ('--ros-args', '-p', 'use_sim_time:=true')
+SIMULATED = ('--ros-args', '-p', 'use_sim_time:=true')
 _PLAYING = {'source': 'motion', 'motion': 'periodic'}
 
 
@@ -53,7 +53,7 @@ def composed_graph_is_carried(seconds: float) -> bool:
     """Measure all nodes, recorder included, composed here in real time, once they have settled."""
     with tempfile.TemporaryDirectory() as folder:
         bag = str(Path(folder) / 'bag')
-        graph = _Composition(ALL_NODES, {'recorder': {'bag': bag}, 'console': _PLAYING})
+        graph = Composition(ALL_NODES, {'recorder': {'bag': bag}, 'console': _PLAYING})
         try:
             graph.enable()
             graph.serve(_SETTLING_S)
@@ -88,7 +88,7 @@ def lock_step_speed(seconds: float) -> float:
     with tempfile.TemporaryDirectory() as folder:
         bag = str(Path(folder) / 'bag')
         overrides = {'recorder': {'bag': bag}, 'console': _PLAYING}
-        graph = _Composition((*ALL_NODES, SimulationClockNode), overrides, _SIMULATED)
+        graph = Composition((*ALL_NODES, SimulationClockNode), overrides, SIMULATED)
         try:
             graph.advance(0.5)
             graph.enable()
@@ -100,7 +100,7 @@ def lock_step_speed(seconds: float) -> float:
             graph.close()
 
 
-class _Composition:
+class Composition:
     """Nodes in this process with a context and a domain of their own."""
 
     _PATIENCE_S = 60.0
