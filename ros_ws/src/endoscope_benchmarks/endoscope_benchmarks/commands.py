@@ -85,8 +85,9 @@ BENCHES: dict[str, Bench] = {
         'kept_messages',
         'what it costs the recorder to keep the last 20 s in memory',
         'Runs all nodes in one process in lock-step, 1000 ticks a second, with a recorder that '
-        'hears nothing, hears all, keeps the last 20 s, records, and does both, and prints the least '
-        'CPU time of a second of motion. Exits 1 where keeping costs more than 3 % of a core.',
+        'hears nothing, hears all, keeps the last 20 s, records, and does both, and prints the '
+        'least CPU time of a second of motion. Exits 1 where keeping costs more than 3 % of a '
+        'core.',
         (
             _seconds(20.0, 'of simulated motion of each run'),
             _option('--rounds', 'of the five runs (default: 3)', type=COUNT, default=3),
