@@ -235,6 +235,21 @@ BENCHES: dict[str, Bench] = {
             _jobs(),
         ),
     ),
+    'watch': Bench(
+        'watch.trial',
+        'whether a rig that becomes different while it moves is noticed',
+        'Changes a moving rig in each of ten ways for every seed, and prints how many changes were '
+        'told within 10 s of motion, and at the right stage; then moves rigs that stay as they '
+        'are, 10 min each, and prints the false alarms. Seeds from 1 to 999 are for development; '
+        'of others, first runs are reported.',
+        (
+            _seeds('of the changes (1-3)'),
+            _seeds('of rigs that stay as they are (1-6)', '--nominal', last=6),
+            _option('--derive', 'derive the thresholds from these', action='store_true'),
+            _file('--write', 'module for them'),
+            _jobs(),
+        ),
+    ),
     'limits': Bench(
         'concealed.limits',
         'how weak an effect may be and still be named',

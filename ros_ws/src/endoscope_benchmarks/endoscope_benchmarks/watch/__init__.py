@@ -1,0 +1,1 @@
+"""Rigs that become different while they are watched."""

@@ -1,0 +1,181 @@
+"""Rigs that become different while they move, and what a watch says of them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_benchmarks.concealed import motions, rigs
+from endoscope_core.monitoring import Alarm, Part, RigWatch
+from endoscope_core.monitoring.criteria import THRESHOLDS
+from endoscope_core.monitoring.rig_watch import BLOCK_S
+from endoscope_core.physics import EffectSpec, PlantDescription, SensorModel, layout
+from endoscope_core.physics.effects import describe
+from endoscope_core.physics.kernel import run_joints
+from endoscope_core.physics.packing import pack, rest_state
+from endoscope_core.physics.simulator import TICK
+
+Array = NDArray[np.float64]
+
+KINDS = {
+    'cell zero': Part.CELL,
+    'cell gain': Part.CELL,
+    'slip of a cable': Part.WIRE,
+    'tracker shift': Part.TRACKER,
+    'lost pretension': Part.WIRE,
+    'tighter tube': Part.SHEATH,
+    'higher friction': Part.JOINT,
+    'contact': Part.JOINT,
+    'gear backlash': Part.ACTUATOR,
+    'slower servo': Part.ACTUATOR,
+}
+SIZES = (0.7, 1.5)
+"""Of what the catalogue of effects has as typical."""
+TOLD_WITHIN_S = 10.0
+SEGMENT_S = 600.0
+"""Nominal motion after which rig, tube, sheath and hand are drawn anew."""
+_BLOCK = round(BLOCK_S / TICK)
+_TRACKER_TICKS = 25
+_CHANGE_S, _AFTER_S = (50.0, 80.0), 16.0
+_AT_OFF = {
+    'load_cell_bias': {'bias_n': 0.0},
+    'load_cell_gain': {'gain': 1.0},
+    'tracker_bias': {'bias_rad': 0.0},
+    'contact': {'stiffness': 0.0},
+    'gear_backlash': {'gap_rad': 0.0},
+    'actuator_lag': {'time_constant_s': 0.0},
+}
+_OF_EFFECT = {
+    'cell zero': ('load_cell_bias', 0.0, 0.3),
+    'cell gain': ('load_cell_gain', 1.0, 0.15),
+    'tracker shift': ('tracker_bias', 0.0, 0.05),
+    'gear backlash': ('gear_backlash', 0.0, 0.1),
+    'slower servo': ('actuator_lag', 0.0, 0.03),
+}
+"""Effect of the catalogue, its first parameter when it is off, and what a typical one adds."""
+_BOTH_WAYS = ('cell zero', 'cell gain', 'tracker shift', 'contact')
+_SLIPPED_M, _LOST_N, _TIGHTER, _ROUGHER, _STIFFNESS = 5e-4, 1.6, 0.6, 0.6, 0.01
+
+
+@dataclass(frozen=True)
+class Watched:
+    """What a watch said of one rig; times in s of motion."""
+
+    kind: str  # in `KINDS`, or empty for none
+    seed: int
+    changed_at: float
+    alarms: tuple[Alarm, ...]
+    largest: Mapping[str, float]  # largest gain of each part
+
+    @property
+    def early(self) -> bool:
+        """Whether something was told before anything had changed."""
+        return any(not self.kind or alarm.at <= self.changed_at for alarm in self.alarms)
+
+    @property
+    def told(self) -> bool:
+        """Whether the change was told in time."""
+        end = self.changed_at + TOLD_WITHIN_S
+        return not self.early and any(alarm.at <= end for alarm in self.alarms)
+
+    @property
+    def right(self) -> bool:
+        """Whether it was told of its part."""
+        first = min(self.alarms, key=lambda alarm: alarm.at, default=None)
+        return self.told and first is not None and first.parts[:1] == (KINDS[self.kind],)
+
+
+def watched(seed: int, kind: str, thresholds: Mapping[str, float] = THRESHOLDS) -> Watched:
+    """Move a drawn rig, change it if there is a kind, and watch it."""
+    generator = np.random.default_rng([seed, [*KINDS, ''].index(kind)])
+    described = rigs.described_rig(generator, 2)
+    true = rigs.true_rig(generator, described)
+    if generator.random() < 0.5:
+        true = rigs.other_sheath(generator, true)
+    at = BLOCK_S * round(generator.uniform(*_CHANGE_S) / BLOCK_S)
+    moving = _motion(generator, at + _AFTER_S if kind else SEGMENT_S)
+    rig = _ChangingRig(generator, true, kind, at)
+    watch, sensors = RigWatch(described, thresholds), SensorModel(true.sensors, seed)
+    largest = dict.fromkeys(map(str, Part), 0.0)
+    for begin in range(0, len(moving) - _BLOCK + 1, _BLOCK):
+        setpoint = moving[begin : begin + _BLOCK]
+        out = rig.move(setpoint).transpose(1, 0, 2)
+        time = (begin + np.arange(_BLOCK)) * TICK
+        watch.setpoint.append(time, setpoint)
+        shaft = sensors.shaft_position(out[:, :, layout.OUT_MOTOR])
+        watch.motor.append(
+            time, np.hstack([shaft, sensors.shaft_effort(out[:, :, layout.OUT_EFFORT])])
+        )
+        wires = out[:, :, layout.OUT_TENSION_A : layout.OUT_TENSION_B + 1]
+        watch.wires.append(time, sensors.tension(wires))
+        seen = slice(None, None, _TRACKER_TICKS)
+        watch.tracker.append(time[seen], sensors.bending(out[seen, :, layout.OUT_BENDING]))
+        watch.update(float(time[-1]))
+        for part, gain in watch.gains().items():
+            largest[part] = max(largest[part], gain)
+    return Watched(kind, seed, at, tuple(watch.alarms), largest)
+
+
+class _ChangingRig:
+    """A simulated rig whose numbers, or wires, become others at a moment."""
+
+    def __init__(
+        self, generator: np.random.Generator, true: PlantDescription, kind: str, at: float
+    ) -> None:
+        self._kind, self._at = kind, round(at / TICK)
+        self._joint, self._wire = int(generator.integers(2)), int(generator.integers(2))
+        self._size, self._depth = generator.uniform(*SIZES), generator.uniform(0.3, 0.6)
+        self._sign = generator.choice([-1.0, 1.0]) if kind in _BOTH_WAYS else 1.0
+        effects = []
+        for j, name in enumerate(true.joints):
+            off = {effect: dict(values) for effect, values in _AT_OFF.items()}
+            for cell in ('load_cell_bias', 'load_cell_gain'):
+                off[cell]['wire'] = float(self._wire)
+            tighter = kind == 'tighter tube' and j == self._joint
+            factor = 1.0 + _TIGHTER * self._size if tighter else 1.0
+            off['configuration_change'] = {'time_s': at, 'factor': factor}
+            effects += [EffectSpec(effect, name, values) for effect, values in off.items()]
+        self._stiffness = true.joints[true.joint_names()[self._joint]].wire_stiffness
+        self._p, self._on = pack(replace(true, effects=tuple(effects)))
+        self._state = rest_state(self._p, self._on, TICK)
+        self._ticks, self._bent = 0, (0.0, 0.0)
+
+    def move(self, setpoint: Array) -> Array:
+        """Noise-free readings (J, N, OUTPUTS) while setpoints (N, J) are in force."""
+        if self._kind and self._ticks == self._at:
+            self._change()
+        inputs = np.zeros((len(self._p), len(setpoint), layout.INPUTS))
+        inputs[:, :, layout.IN_COMMAND], inputs[:, :, layout.IN_MOTOR] = setpoint.T, np.nan
+        out = np.empty((len(self._p), len(setpoint), layout.OUTPUTS))
+        run_joints(*self._state, self._p, self._on, inputs, True, TICK, out)
+        self._ticks += len(setpoint)
+        bent = out[self._joint, :, layout.OUT_JOINT]
+        self._bent = min(self._bent[0], bent.min()), max(self._bent[1], bent.max())
+        return out
+
+    def _change(self) -> None:
+        row, state = self._p[self._joint], self._state[0][self._joint]
+        if self._kind in _OF_EFFECT:
+            effect, off, typical = _OF_EFFECT[self._kind]
+            row[describe(effect).first_parameter] = off + self._sign * self._size * typical
+        elif self._kind == 'slip of a cable':
+            state[layout.TRAVEL + self._wire] += self._size * _SLIPPED_M
+        elif self._kind == 'lost pretension':
+            state[layout.TRAVEL : layout.TRAVEL + 2] += self._size * _LOST_N / self._stiffness
+        elif self._kind == 'higher friction':
+            row[layout.JOINT_FRICTION] *= 1.0 + self._size * _ROUGHER
+        elif self._kind == 'contact':
+            # Where the motion has been before: what is not touched cannot be told.
+            first = describe('contact').first_parameter
+            row[first] = self._depth * self._bent[int(self._sign > 0.0)]
+            row[first + 1] = self._size * _STIFFNESS
+
+
+def _motion(generator: np.random.Generator, seconds: float) -> Array:
+    """Setpoints (N, 2) in rad: a hand half of the time, otherwise motions made to identify."""
+    kinds = (motions.commissioning, motions.another, motions.teleoperation, motions.teleoperation)
+    parts: list[Array] = []
+    while sum(map(len, parts)) * TICK < seconds:
+        parts.append(kinds[int(generator.integers(len(kinds)))](generator, 2))
+    return np.concatenate(parts)[: round(seconds / TICK)]

@@ -1,0 +1,75 @@
+"""`endoscope bench watch`: whether a rig that becomes different is noticed, and nothing else."""
+
+import argparse
+import math
+from collections.abc import Sequence
+
+from scipy.stats import gumbel_r
+
+from endoscope_benchmarks.bench import table_head, table_row
+from endoscope_benchmarks.watch.changing_rig import KINDS, SEGMENT_S, Watched, watched
+from endoscope_core.atomic_output import write_text
+from endoscope_core.monitoring import Part
+from endoscope_core.monitoring.criteria import THRESHOLDS
+from endoscope_core.workers import worker_pool
+
+_PER_HOUR = 0.1
+"""False alarms in an hour of motion that the thresholds are derived for, all parts together."""
+_HOURS = SEGMENT_S / 3600.0
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print a table, or the thresholds; return 0."""
+    # Nothing is told where thresholds are derived, so that each rig is judged to its end.
+    thresholds = dict.fromkeys(map(str, Part), math.inf) if args.derive else THRESHOLDS
+    kinds = () if args.derive else tuple(KINDS)
+    cases = [(seed, kind) for kind in kinds for seed in args.seeds]
+    cases += [(seed, '') for seed in args.nominal]
+    calls = [(*case, thresholds) for case in cases]
+    with worker_pool(args.jobs) as pool:
+        rows = list(pool.map(watched, *zip(*calls, strict=True)))
+    if args.derive:
+        source = derived(rows)
+        print(source)
+        if args.write:
+            write_text(args.write, source)
+    else:
+        _print(rows)
+    return 0
+
+
+def derived(rows: Sequence[Watched]) -> str:
+    """The module of the thresholds, from nominal motion."""
+    # The largest gain of a segment follows a law of extreme values (Gumbel, Statistics of Extremes,
+    # 1958); it is the root of a gain that is about normal. Each part has an equal share of the
+    # false alarms.
+    share = _PER_HOUR * _HOURS / len(Part)
+    lines = []
+    for part in Part:
+        place, scale = gumbel_r.fit([row.largest[part] ** 0.5 for row in rows])
+        threshold = float(f'{gumbel_r.isf(share, place, scale) ** 2:.3g}')
+        largest = max(row.largest[part] for row in rows)
+        lines.append(f"    '{part}': {threshold!r},  # largest seen: {largest:.3g}")
+    first, last = rows[0].seed, rows[-1].seed
+    return (
+        '"""Gains of the likelihood\'s logarithm at which a change of each part is told.\n\n'
+        f'From {len(rows) * _HOURS:g} h of motion of rigs that stay as they are, by\n'
+        f'`endoscope bench watch --derive --nominal {first}-{last}`.\n"""\n\n'
+        + '\n'.join(['THRESHOLDS = {', *lines, '}'])
+        + f'\nFALSE_ALARMS_PER_HOUR = {_PER_HOUR}\n"""Of motion, for which they are derived."""\n'
+    )
+
+
+def _print(rows: Sequence[Watched]) -> None:
+    print(table_head('change', 'rigs', 'told within 10 s', 'right stage', 'told before it'))
+    for kind in (*KINDS, 'all'):
+        of = [row for row in rows if row.kind and kind in (row.kind, 'all')]
+        counts = [sum(getattr(row, name) for row in of) for name in ('told', 'right', 'early')]
+        print(table_row(kind, len(of), *counts))
+    nominal = [row for row in rows if not row.kind]
+    false = sum(row.early for row in nominal)
+    print(f'false alarms: {false} in {len(nominal) * _HOURS:.1f} h of nominal motion')
+    for row in rows:
+        if row.early or (row.kind and not row.right):
+            said = [f'{alarm.at - row.changed_at:+.1f} s {alarm}' for alarm in row.alarms]
+            print(f'{row.kind or "nominal"}, seed {row.seed}: {"; ".join(said) or "nothing told"}')
