@@ -88,32 +88,16 @@ def bouc_wen_normalised_step(y: float, delta: float, travel: float, rho: float, 
 
 
 @njit(cache=True)
-def bouc_wen_normalised_path(
-    driver: NDArray[np.float64],
-    y0: float,
-    travel: float,
-    rho: float,
-    n: float,
-) -> NDArray[np.float64]:
-    """Normalised state along a recorded driving angle (N,), `y0` at the first sample."""
-    states = np.empty(driver.size)
-    y = y0
-    previous = driver[0]
-    for k in range(driver.size):
-        y = bouc_wen_normalised_step(y, driver[k] - previous, travel, rho, n)
-        previous = driver[k]
-        states[k] = y
-    return states
-
-
-@njit(cache=True)
-def asymmetric_path(
+def bouc_wen_path(
     driver: NDArray[np.float64],
     y0: float,
     up: tuple[float, float, float],
     down: tuple[float, float, float],
 ) -> NDArray[np.float64]:
-    """States along a driving angle (N,) in rad; `up` and `down` hold travel, rho and n."""
+    """Normalised states along a driving angle (N,) in rad, `y0` at the first sample.
+
+    `up` and `down` hold travel, rho and n of either direction.
+    """
     states = np.empty(driver.size)
     y = y0
     previous = driver[0]
@@ -221,9 +205,8 @@ class BoucWenParameters(NamedNumbers, ConstantLag):
         return float(bouc_wen_normalised_step(y, delta, self.travel, self.rho, self.n))
 
     def memory_path(self, driver: NDArray[np.float64], y0: float) -> NDArray[np.float64]:
-        states: NDArray[np.float64] = bouc_wen_normalised_path(
-            driver, y0, self.travel, self.rho, self.n
-        )
+        shape = self.travel, self.rho, self.n
+        states: NDArray[np.float64] = bouc_wen_path(driver, y0, shape, shape)
         return states
 
     @classmethod
@@ -306,7 +289,7 @@ class AsymmetricBoucWenParameters(NamedNumbers):
         return float(bouc_wen_normalised_step(y, delta, *shape))
 
     def memory_path(self, driver: NDArray[np.float64], y0: float) -> NDArray[np.float64]:
-        states: NDArray[np.float64] = asymmetric_path(
+        states: NDArray[np.float64] = bouc_wen_path(
             driver,
             y0,
             (self.travel_up, self.rho_up, self.n_up),

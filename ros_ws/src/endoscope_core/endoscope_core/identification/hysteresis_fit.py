@@ -23,7 +23,7 @@ from endoscope_core.hysteresis import (
     forward,
     prandtl_ishlinskii_forward,
 )
-from endoscope_core.hysteresis.bouc_wen import asymmetric_path, bouc_wen_normalised_path
+from endoscope_core.hysteresis.bouc_wen import bouc_wen_path
 from endoscope_core.hysteresis.dahl import dahl_path, play_path
 from endoscope_core.hysteresis.inverse import HysteresisParameters
 from endoscope_core.hysteresis.memory_model import (
@@ -118,11 +118,16 @@ def _bounded(offset: float) -> float:
     return float(np.clip(offset, -GREATEST_OFFSET, GREATEST_OFFSET))
 
 
+def _shape(s: Array) -> tuple[float, float, float]:
+    """Travel in rad, rho and n from a search's numbers (3,); the travel is a logarithm there."""
+    return np.exp(s[0]), s[1], s[2]
+
+
 FAMILIES: dict[str, ModelFamily] = {
     'bouc_wen': ModelFamily(
         (TRAVEL_BOUNDS, RHO_BOUNDS, EXPONENT_BOUNDS),
         (ALPHA_BOUNDS, LAG_BOUNDS),
-        lambda driver, y0, s: bouc_wen_normalised_path(driver, y0, np.exp(s[0]), s[1], s[2]),
+        lambda driver, y0, s: bouc_wen_path(driver, y0, _shape(s), _shape(s)),
         _two_columns,
         _bouc_wen,
         has_offset=False,
@@ -130,9 +135,7 @@ FAMILIES: dict[str, ModelFamily] = {
     'asymmetric_bouc_wen': ModelFamily(
         (TRAVEL_BOUNDS, RHO_BOUNDS, EXPONENT_BOUNDS) * 2,
         (ALPHA_BOUNDS, LAG_BOUNDS, (-0.3, 0.3)),
-        lambda driver, y0, s: asymmetric_path(
-            driver, y0, (np.exp(s[0]), s[1], s[2]), (np.exp(s[3]), s[4], s[5])
-        ),
+        lambda driver, y0, s: bouc_wen_path(driver, y0, _shape(s[:3]), _shape(s[3:])),
         lambda driver, y: np.stack([driver, -y, -driver * y], axis=1),
         _asymmetric,
         has_offset=True,
