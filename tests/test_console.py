@@ -421,6 +421,7 @@ def test_a_gamepad_on_the_topic_joy_obeys_the_same_rules(rig):
         with rig.page() as page:
             rig.client.ask('enable')
             device.buttons[5] = 1
+            rig.until(lambda: page.state, 'a first state')
             device.until(lambda: page.state['lease']['holder'] == 'joy', 'its lease')
             # The button that claimed is no grip.
             device.until(lambda: rig.handle_senders() == ['console_web'], 'the sender')

@@ -8,6 +8,7 @@ import pytest
 from endoscope_benchmarks.concealed.strata import drawn_case
 from endoscope_benchmarks.peers.library import terms_of
 from endoscope_benchmarks.peers.problem import PERIOD_S, predicts, problem_of
+from endoscope_benchmarks.peers.regions import Overlap, changed_windows, pooled, windows_in
 from endoscope_benchmarks.peers.symbolic import OF_PLANT, OF_SENSOR, named_by
 from endoscope_benchmarks.peers.trial import PEERS, example, require_installed
 from endoscope_core.errors import EndoscopeError
@@ -49,6 +50,30 @@ def test_noise_is_not_predicted():
 @pytest.mark.parametrize('peer', [name for name in PEERS if not PEERS[name][0]])
 def test_a_peer_that_is_written_here_works_on_its_own_example(peer):
     assert example(peer).works
+
+
+@pytest.mark.skipif(importlib.util.find_spec('mujoco') is None, reason='peers are not installed')
+def test_mujoco_finds_the_numbers_of_its_own_example():
+    assert example('mujoco.sysid').works
+
+
+def test_regions_are_judged_by_the_windows_that_they_share():
+    true = windows_in([(1.0, 2.0)], 4.0)
+    assert np.flatnonzero(true).tolist() == [4, 5, 6, 7]
+    half = Overlap.of(windows_in([(1.5, 2.5)], 4.0), true)
+    assert half == Overlap(hits=2, extra=2, missed=2, all=16)
+    assert half.f1 == pytest.approx(0.5)
+    assert half.f1_of_all == pytest.approx(0.4)
+    silent = Overlap.of(windows_in([], 4.0), windows_in([], 4.0))
+    assert silent.f1 == 1.0
+    # A false region where nothing is concealed lowers what is found elsewhere.
+    alarm = Overlap.of(windows_in([(0.0, 1.0)], 4.0), windows_in([], 4.0))
+    assert pooled([half, silent, alarm]).f1 == pytest.approx(0.4 / 1.2)
+
+
+def test_a_law_changes_windows_and_a_rig_without_one_none(case):
+    assert 0.5 < changed_windows(case).mean() <= 1.0
+    assert not changed_windows(drawn_case('nulls', 4)).any()
 
 
 @pytest.mark.skipif(importlib.util.find_spec('pyoperon') is not None, reason='peers are installed')

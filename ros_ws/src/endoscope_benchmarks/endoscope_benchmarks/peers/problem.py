@@ -48,11 +48,22 @@ class OwnExample:
 
 
 @dataclass(frozen=True)
+class Reply:
+    """What a peer says of a problem."""
+
+    statement: Statement | None  # what is missing
+    # Intervals in s in which it is; None from a peer that says nothing of where.
+    intervals: tuple[tuple[float, float], ...] | None = None
+    report: str = ''  # what else it says, where it cannot name anything
+
+
+@dataclass(frozen=True)
 class Problem:
     """One joint of a case, M samples on a common grid."""
 
     joint: str  # the one of which the refitted plant leaves most
     refitted: Fit  # of the nominal plant
+    described: Fit  # of the same, with the numbers as described
     time: Array  # (M,), in s from the first command
     # (M, 5): measured less simulated, in noise units, of each of `SIGNALS`.
     residuals: Array
@@ -88,13 +99,13 @@ def problem_of(case: Case) -> Problem:
     plant = case.described
     observed = with_held_noise(observe(case.recording, plant))
     _, references = with_references(case.recording, observed, plant, BAND, 1)
-    refitted, _ = max(references, key=lambda pair: float(np.mean(pair[0].residuals ** 2)))
+    refitted, described = max(references, key=lambda pair: float(np.mean(pair[0].residuals ** 2)))
     observation = refitted.model.observation
     end = min(float(channel.time[-1]) for channel in observation.channels)
     grid = np.arange(2.0 * PERIOD_S, end - PERIOD_S, PERIOD_S)
     residuals = on_grid(observation, -refitted.residuals, grid)
     joint, states = observation.joint, _states(refitted, grid)
-    return Problem(joint, refitted, grid, residuals, states)
+    return Problem(joint, refitted, described, grid, residuals, states)
 
 
 def on_grid(observation: JointObservation, values: Array, grid: Array) -> Array:
