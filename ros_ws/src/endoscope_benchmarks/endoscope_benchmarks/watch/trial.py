@@ -47,11 +47,12 @@ def derived(rows: Sequence[Watched]) -> str:
     share = _PER_HOUR * _HOURS / len(Part)
     quantile, lines = float(gumbel_r.isf(share)), []
     for part in Part:
-        # By moments: a part of which nothing is ever seen has no likelihood to fit.
+        # By moments: a part of which nothing is ever seen has no likelihood to fit; its threshold
+        # is that of a likelihood ratio (Ville, Etude critique de la notion de collectif, 1939).
         roots = np.sqrt([row.largest[part] for row in rows])
         scale = float(np.std(roots)) * math.sqrt(6.0) / math.pi
         place = float(np.mean(roots)) - np.euler_gamma * scale
-        threshold = float(f'{(place + scale * quantile) ** 2:.3g}')
+        threshold = float(f'{max((place + scale * quantile) ** 2, -math.log(share)):.3g}')
         largest = max(row.largest[part] for row in rows)
         lines.append(f"    '{part}': {threshold!r},  # largest seen: {largest:.3g}")
     first, last = rows[0].seed, rows[-1].seed
