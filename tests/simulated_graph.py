@@ -128,6 +128,9 @@ class SimulatedGraph(ProbedGraph):
         """Give a state command; the state after it."""
         self._commands.publish(String(data=text))
         self.advance(0.02)
+        # The state is told at the supervisor's own beat, of which the first may be yet to come.
+        while not self.states:
+            self.advance(0.02)
         return self.states[-1]
 
     def enable(self) -> None:

@@ -1,4 +1,4 @@
-"""`endoscope bag info` and `endoscope bag recover`."""
+"""`endoscope bag info`, `endoscope bag recover` and `endoscope bag list`."""
 
 import json
 
@@ -6,10 +6,15 @@ import pytest
 
 from endoscope_bags import BagWriter, open_bag
 from endoscope_bags.cdr_encoding import encode_string
+from endoscope_bags.event_bag import FAULT, MARK, EventBag, new_event_bag
 from endoscope_bags.message_types import STRING
+from endoscope_bags.recent_messages import RecentMessages
+from endoscope_bags.recording_session import Arrival, RecordingSession
 from endoscope_bringup.cli import main
 
 MS = 10**6
+START = 1_790_000_000 * 10**9
+REASON = 'tension of wire_x_pos is 41.2 N: more\nthan 40 N'
 
 
 @pytest.fixture
@@ -68,3 +73,54 @@ def test_info_as_json_has_numbers(bag, capsys):
     assert topic['name'] == '/a'
     assert topic['rate_hz'] == pytest.approx(1000.0)
     assert (topic['pauses'], topic['gaps'], topic['lost']) == (0, 0, 0)
+
+
+def bag_of_a_fault(folder):
+    """A recording of 5 s whose fault is followed by a mark."""
+    recent = RecentMessages(1.0, 10**8)
+
+    def message(k):
+        at = START + k * MS
+        return Arrival(at, 0, k + 1, at, encode_string(str(k)))
+
+    def opened(records):
+        session = RecordingSession(new_event_bag(folder, FAULT, 50), records=records)
+        session.add_topic('/stream', STRING)
+        return session
+
+    for k in range(5000):
+        recent.add([message(k)], set(), START + k * MS)
+    event = EventBag(recent, FAULT, START + 4999 * MS)
+    event.explain(REASON)
+    event.begin(opened)
+    event.add(MARK, START + 5001 * MS, 'seen by the operator')
+    return event.close().path
+
+
+def test_the_list_tells_faults_with_time_and_reason(tmp_path, capsys):
+    path = bag_of_a_fault(tmp_path)
+    with BagWriter(tmp_path / 'plain.mcap') as writer:
+        writer.write_raw('/stream', STRING, encode_string('x'), START - 10**9)
+    (tmp_path / 'notes.txt').write_text('no recording')
+    (tmp_path / 'broken.mcap').write_text('no recording either')
+    assert main(['bag', 'list', str(tmp_path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].endswith('broken.mcap')
+    assert 'not an MCAP recording' in lines[1] or 'text, no recording' in lines[1]
+    assert lines[2].startswith('recording')
+    assert lines[2].endswith('plain.mcap')
+    assert lines[3].startswith('fault')
+    assert lines[3].endswith(path.name)
+    assert 'fault at 2026-09-21T14:13:24.999' in lines[4]
+    assert 'tension of wire_x_pos' in lines[4]
+    assert 'mark at' in lines[5]
+    assert main(['bag', 'list', str(tmp_path), '--json']) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told[2]['events'][0] == {'kind': 'fault', 'at_ns': START + 4999 * MS, 'reason': REASON}
+
+
+def test_a_folder_without_recordings_and_none_at_all(tmp_path, capsys):
+    assert main(['bag', 'list', str(tmp_path)]) == 0
+    assert capsys.readouterr().out == f'{tmp_path}: no recording\n'
+    assert main(['bag', 'list', str(tmp_path / 'none')]) == 2
+    assert 'no such folder' in capsys.readouterr().err

@@ -1,11 +1,8 @@
 """Bags of faults and marks: what led to them, what was in force, and why they were kept."""
 
-import json
-
 import pytest
 
 from endoscope_bags import BagError, open_bag
-from endoscope_bags.bag_writer import BagWriter
 from endoscope_bags.cdr_encoding import encode_string
 from endoscope_bags.copying import cut, recover
 from endoscope_bags.event_bag import (
@@ -22,7 +19,6 @@ from endoscope_bags.listing import bags_in
 from endoscope_bags.message_types import STRING
 from endoscope_bags.recent_messages import RecentMessages, packed
 from endoscope_bags.recording_session import Arrival, RecordingSession
-from endoscope_bringup.cli import main
 
 MS = 10**6
 START = 1_790_000_000 * 10**9
@@ -148,32 +144,3 @@ def test_no_more_are_written_than_may_be_and_none_is_deleted(tmp_path):
 )
 def test_what_is_no_event_is_none(text):
     assert event_from_text(text) is None
-
-
-def test_the_list_tells_faults_with_time_and_reason(tmp_path, capsys):
-    path = written(tmp_path)
-    with BagWriter(tmp_path / 'plain.mcap') as writer:
-        writer.write_raw('/stream', STRING, encode_string('x'), START - 10**9)
-    (tmp_path / 'notes.txt').write_text('no recording')
-    (tmp_path / 'broken.mcap').write_text('no recording either')
-    assert main(['bag', 'list', str(tmp_path)]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0].endswith('broken.mcap')
-    assert 'not an MCAP recording' in lines[1] or 'text, no recording' in lines[1]
-    assert lines[2].startswith('recording')
-    assert lines[2].endswith('plain.mcap')
-    assert lines[3].startswith('fault')
-    assert lines[3].endswith(path.name)
-    assert 'fault at 2026-09-21T14:13:24.999' in lines[4]
-    assert 'tension of wire_x_pos' in lines[4]
-    assert 'mark at' in lines[5]
-    assert main(['bag', 'list', str(tmp_path), '--json']) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told[2]['events'][0] == {'kind': 'fault', 'at_ns': START + 4999 * MS, 'reason': REASON}
-
-
-def test_a_folder_without_recordings_and_none_at_all(tmp_path, capsys):
-    assert main(['bag', 'list', str(tmp_path)]) == 0
-    assert capsys.readouterr().out == f'{tmp_path}: no recording\n'
-    assert main(['bag', 'list', str(tmp_path / 'none')]) == 2
-    assert 'no such folder' in capsys.readouterr().err
