@@ -14,8 +14,10 @@ MODES = ('none', *HYSTERESIS_MODELS, PHYSICAL, ADAPTIVE_PHYSICAL)
 BY_CLASS = 'class'
 BY_SIZE = 'size'
 BY_PLANT = 'plant'
-SELECTIONS = (BY_CLASS, BY_SIZE, BY_PLANT)
-"""What of a calibration selects the parameters of a mode."""
+BY_ADOPTED = 'adopted'
+"""Selection by a plant file that has been adopted, whatever a calibration found."""
+SELECTIONS = (BY_CLASS, BY_SIZE, BY_PLANT, BY_ADOPTED)
+"""What selects the parameters of a mode."""
 
 ADAPTIVE = 'adaptive'
 RECURSIVE_LEAST_SQUARES = 'recursive_least_squares'

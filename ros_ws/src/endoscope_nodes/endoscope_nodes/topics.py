@@ -258,6 +258,34 @@ TOPICS = (
         one_sender=True,
     ),
     Topic(
+        names.COMPENSATOR_PLANT,
+        _DIAGNOSTICS,
+        _LATCHED_STATE,
+        'status `compensator: adopted plant`: `hash`, the first digits of the SHA-256 of the plant '
+        'file in force, and of the one before as `before`, `left_out` of its inverse, how far the '
+        'tip may be bent as `reach.bend_x.low` and so on in rad, and the file itself as `plant`, '
+        'all but the reach empty where none has been adopted; status `compensator: adoption`, '
+        'what became of the last request: `id`, `state` `executing`, `succeeded` or `rejected`, '
+        'and `code`: `not_a_plant`, `other_joints`, `not_invertible`, `beyond_range`, `moving`, '
+        '`busy`, `not_measured`, `no_session`, `other_session`, `other_sender` or '
+        '`nothing_to_undo`; the message is the same in words',
+        offered=RESULT,
+        asked=RESULT,
+        said_by=('compensator',),
+        heard_by=('console',),
+        one_sender=True,
+    ),
+    Topic(
+        names.COMPENSATOR_ADOPT,
+        _DIAGNOSTICS,
+        'when somebody asks',
+        'status `adopt`: `id` of the request and the file as `plant`, empty for the plant before; '
+        '`header.frame_id` names the motion session',
+        offered=EVENT,
+        asked=EVENT,
+        heard_by=('compensator',),
+    ),
+    Topic(
         names.OPERATING_STATE,
         'std_msgs/msg/String',
         'on change and 20 Hz, latched',

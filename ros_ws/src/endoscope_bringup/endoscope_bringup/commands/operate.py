@@ -17,6 +17,8 @@ _ACTIONS = {
     'resume': 'go on after a pause; waits for ENABLED',
     'calibrate': 'find the hysteresis class of the tube by a motion of some 10 s; waits for the '
     'result',
+    'adopt': 'compensate by an improved plant, as `endoscope explain` writes it: at rest, in the '
+    'session that is open; --undo: by the plant before',
     'tare': 'take the tension of the last second for zero; wires slack, shafts at rest',
     'register_straight': "take the tracker's pose of the last second for straight",
     'reboot': 'restart the servos without torque; not while the slave is ENABLED',
@@ -69,6 +71,12 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
             action.add_argument(
                 'value', metavar='VALUE', help='of its type: true, 0.5, physical, [bend_x, bend_y]'
             )
+        if name == 'adopt':
+            which = action.add_mutually_exclusive_group(required=True)
+            which.add_argument('plant', nargs='?', metavar='P.yaml', help='the improved plant')
+            which.add_argument(
+                '--undo', action='store_true', help='go back to what was in force before'
+            )
         if name == 'record':
             action.add_argument('what', choices=('start', 'stop', 'mark'))
             action.add_argument(
@@ -86,6 +94,7 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_core.errors import InputError, printable
     from endoscope_nodes.client.graph_client import joined_graph
     from endoscope_nodes.client.graph_listener import GraphError
+    from endoscope_nodes.client.plant_adoption import RefusedAdoptionError
 
     if getattr(args, 'text', '') and args.what != 'mark':
         raise InputError(f'record {args.what} takes no text; record mark does')
@@ -99,7 +108,8 @@ def run(args: argparse.Namespace) -> int:
             reply = act(client, args)
     except GraphError as error:
         if args.json:
-            print(json.dumps({'action': name, 'done': False, 'answer': str(error)}))
+            code = {'code': error.code} if isinstance(error, RefusedAdoptionError) else {}
+            print(json.dumps({'action': name, 'done': False, 'answer': str(error)} | code))
         else:
             print(f'{name}: {error}', file=sys.stderr)
         return REFUSED

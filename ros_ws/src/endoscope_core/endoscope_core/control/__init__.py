@@ -5,6 +5,13 @@ from endoscope_core.control.adaptive_backlash import (
     AdaptiveBacklashController,
     AdaptiveBacklashSettings,
 )
+from endoscope_core.control.adopted_plant import (
+    AdoptedPlant,
+    AdoptionCode,
+    AdoptionError,
+    adopted_plant,
+    plant_hash,
+)
 from endoscope_core.control.desired_motion import DesiredMotion
 from endoscope_core.control.feedforward import Feedforward, FeedforwardLaw, FeedforwardSettings
 from endoscope_core.control.handle import Handle, HandleRefusal, HandleSettings
@@ -31,6 +38,9 @@ __all__ = [
     'AdaptiveBacklashController',
     'AdaptiveBacklashSettings',
     'AdaptivePhysicalInverse',
+    'AdoptedPlant',
+    'AdoptionCode',
+    'AdoptionError',
     'BendingRange',
     'DesiredMotion',
     'Feedforward',
@@ -48,8 +58,10 @@ __all__ = [
     'RecursiveHysteresisSettings',
     'TrackerFeedback',
     'TrackerMeasurement',
+    'adopted_plant',
     'bending_range',
     'keep_within',
+    'plant_hash',
     'ranges_in_words',
     'shipped_limits',
 ]

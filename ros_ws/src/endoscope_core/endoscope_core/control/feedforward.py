@@ -141,6 +141,8 @@ class FeedforwardLaw:
                 raise ValueError(
                     f'mode {self.mode!r} needs {kind.__name__}, not {type(given).__name__}'
                 )
+            if self.mode == ADAPTIVE_PHYSICAL and getattr(given, 'added', ()):
+                raise ValueError(f'mode {self.mode!r} learns a nominal plant, not one with effects')
 
 
 @dataclass(frozen=True)
@@ -235,6 +237,7 @@ class Feedforward:
         for j, joint in enumerate(self._joints):
             before = joint.inverse.direction
             joint.inverse = self._inverse(j)
+            self._couple([each.desired for each in self._joints])
             joint.wanted = joint.inverse.begin(before, joint.desired, joint.velocity)
             joint.offset = joint.command - joint.wanted
 
@@ -249,6 +252,7 @@ class Feedforward:
             begin = self._checked('desired', desired)
             for joint, angle in zip(self._joints, begin, strict=False):
                 joint.desired, joint.velocity = angle, 0.0
+            self._couple(begin)
         if not self._joints:
             self._start = start
             return
@@ -269,6 +273,7 @@ class Feedforward:
         speeds = self._checked('velocity', velocity)
         if not (math.isfinite(dt) and dt > 0.0):
             raise ValueError(f'dt = {dt} s must be positive and finite')
+        self._couple(angles)
         if not self._joints:
             self._begin(angles, speeds)
         return np.array(
@@ -306,10 +311,18 @@ class Feedforward:
         joint.inverse.sent(joint.command, dt)
         return joint.command
 
+    def _couple(self, angles: Sequence[float]) -> None:
+        """Tell the inverse of each joint where the other one is to be, in rad."""
+        for j, joint in enumerate(self._joints):
+            if isinstance(joint.inverse, PhysicalInverse):
+                joint.inverse.other = _other_than(j, angles)
+
     def _begin(self, angles: list[float], speeds: list[float]) -> None:
         start = self._start
         for j, (angle, speed) in enumerate(zip(angles, speeds, strict=True)):
             inverse = self._inverse(j)
+            if isinstance(inverse, PhysicalInverse):
+                inverse.other = _other_than(j, angles)
             wanted = inverse.begin(0.0, angle, speed)
             command = wanted if start is None else start[j]
             self._joints.append(_Joint(inverse, angle, speed, wanted, command, command - wanted))
@@ -329,3 +342,8 @@ class Feedforward:
         if len(numbers) != self._count or not all(map(math.isfinite, numbers)):
             raise ValueError(f'{name} must be {self._count} finite numbers, not {numbers}')
         return numbers
+
+
+def _other_than(joint: int, angles: Sequence[float]) -> float:
+    """Angle in rad of the other one of two joints; zero where there are not two."""
+    return angles[1 - joint] if len(angles) == 2 else 0.0

@@ -1,16 +1,17 @@
 """One joint behind one tube as a compensator keeps it in mind, and how far it can be bent.
 
-The model is the nominal plant itself with the shaft given. Friction along the sheath, the joint's
-friction and its stiffness do not depend on speed, so a motion is known by its turning points: with
-other parameters the model is brought to where it would be by going through them again (return-point
-memory: Mayergoyz, Mathematical Models of Hysteresis, 1991, ch. I).
+The model is the plant itself with the shaft given: the nominal one or, where a plant file has been
+adopted, one with effects. Friction along the sheath, the joint's friction and its stiffness do not
+depend on speed, so a motion is known by its turning points: with other parameters the model is
+brought to where it would be by going through them again (return-point memory: Mayergoyz,
+Mathematical Models of Hysteresis, 1991, ch. I).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 from typing import Any
 
@@ -19,19 +20,30 @@ from numpy.typing import NDArray
 
 from endoscope_core.compiled import Flags, compiled
 from endoscope_core.control.limits import MotorLimits, shipped_limits
-from endoscope_core.physics.description import JointParameters, PlantDescription
-from endoscope_core.physics.kernel import advance_tick, settle, tensions
+from endoscope_core.physics.description import (
+    EffectSpec,
+    JointParameters,
+    PlantDescription,
+    TermSpec,
+)
+from endoscope_core.physics.effect import Effect
+from endoscope_core.physics.effects import describe
+from endoscope_core.physics.functions import describe_place
+from endoscope_core.physics.kernel import advance_tick, exponent_varies, settle, tensions
 from endoscope_core.physics.layout import (
     IN_MOTOR,
+    IN_OTHER_JOINT,
     INPUTS,
-    JOINT,
     MOTOR,
+    TIP,
 )
 from endoscope_core.physics.packing import pack, rest_state
 from endoscope_core.physics.sheath import MOTOR_END
 
 PROFILE = 'friction_profile'
 Array = NDArray[np.float64]
+Added = tuple[EffectSpec | TermSpec, ...]
+"""Physics of one joint beyond the nominal plant, whatever joint its entries name."""
 
 TICK = 1e-3
 PRECISION = 1e-7
@@ -43,6 +55,7 @@ _JOINT_STEP = 0.1
 _TRIES = 60
 _STEPS = 1000
 _MOST_TURNS = 12
+_ALONE = 'joint'
 _BEYOND = 10.0
 """Rad to which no joint bends."""
 
@@ -53,9 +66,10 @@ class PhysicalParameters:
 
     # Of the nominal plant; the capstan exponent is the tube's.
     joint: JointParameters = field(default_factory=JointParameters)
+    added: Added = ()  # of an adopted plant
 
     def to_dict(self) -> dict[str, Any]:
-        """All numbers by name; the friction profile is a list."""
+        """All nominal numbers by name; the friction profile is a list."""
         values = {item.name: getattr(self.joint, item.name) for item in fields(JointParameters)}
         return values | {PROFILE: list(self.joint.friction_profile)}
 
@@ -109,89 +123,110 @@ microsecond longer to recognise a named one, a third of what `seek` takes.
 
 
 @compiled
-def _try(model: Model, trial: Array, shaft: float, tick: float) -> float:
-    """Joint angle in rad after a tick in which the shaft turns to `shaft`, left in `trial`."""
+def _try(model: Model, trial: Array, tried: Array, shaft: float, tick: float) -> float:
+    """Tip's angle in rad after a tick in which the shaft turns to `shaft`, left in `trial`."""
     x, history, sheath, p, on, inputs = model
     for i in range(len(x)):
         trial[i] = x[i]
     inputs[IN_MOTOR] = shaft
-    advance_tick(trial, history, sheath, p, on, inputs, tick)
-    return trial[JOINT]
+    if exponent_varies(on):
+        # The tick works out shapes of its own, which the next trial must not begin with.
+        _copy(sheath, tried)
+        advance_tick(trial, history, tried, p, on, inputs, tick)
+    else:
+        advance_tick(trial, history, sheath, p, on, inputs, tick)
+    return trial[TIP]
+
+
+@compiled
+def _copy(source: Array, target: Array) -> None:
+    for i in range(source.shape[0]):
+        for j in range(source.shape[1]):
+            target[i, j] = source[i, j]
 
 
 @compiled
 def _seek(
     model: Model,
     trial: Array,
+    tried: Array,
     target: float,
     low: float,
     high: float,
     tension_limit: float,
     tick: float,
 ) -> None:
-    """Turn the shaft within [low, high] so that the joint is at `target` after a tick.
+    """Turn the shaft within [low, high] so that the tip is at `target` after a tick.
 
-    The joint's angle grows with the shaft's and stands still in the dead zone: a bracketed secant
+    The tip's angle grows with the shaft's and stands still in the dead zone: a bracketed secant
     (Dowell, Jarratt, BIT 11, 1971) finds the shaft's angle. What cannot be reached is approached as
     far as bounds and tension allow.
     """
-    x, sheath = model[0], model[2]
+    x, sheath, on = model[0], model[2], model[4]
     near = x[MOTOR]
-    near_error = _try(model, trial, near, tick) - target
+    near_error = _try(model, trial, tried, near, tick) - target
     if abs(near_error) > PRECISION:
         way = -1.0 if near_error > 0.0 else 1.0
         far = high if way > 0.0 else low
-        error = _try(model, trial, far, tick) - target
+        error = _try(model, trial, tried, far, tick) - target
         shaft, far_error = far, error
         if way * error > 0.0:
             for _ in range(_TRIES):
                 if abs(error) <= PRECISION or abs(far - near) <= 1e-12:
                     break
                 shaft = far - far_error * (far - near) / (far_error - near_error)
-                error = _try(model, trial, shaft, tick) - target
+                error = _try(model, trial, tried, shaft, tick) - target
                 if error * far_error > 0.0:
                     near_error *= 1.0 - error / far_error if error / far_error < 0.9 else 0.5
                 else:
                     near, near_error = far, far_error
                 far, far_error = shaft, error
         side = 0 if way > 0.0 else 1
-        if tensions(trial, sheath, MOTOR_END)[side] > tension_limit:
+        used = tried if exponent_varies(on) else sheath
+        if tensions(trial, used, MOTOR_END)[side] > tension_limit:
             allowed, too_far = x[MOTOR], shaft
             for _ in range(_TRIES):
                 if abs(too_far - allowed) <= 1e-9:
                     break
                 shaft = 0.5 * (allowed + too_far)
-                _try(model, trial, shaft, tick)
-                if tensions(trial, sheath, MOTOR_END)[side] > tension_limit:
+                _try(model, trial, tried, shaft, tick)
+                if tensions(trial, used, MOTOR_END)[side] > tension_limit:
                     too_far = shaft
                 else:
                     allowed = shaft
-            _try(model, trial, allowed, tick)
+            _try(model, trial, tried, allowed, tick)
     for i in range(len(x)):
         x[i] = trial[i]
+    if exponent_varies(on):
+        _copy(tried, sheath)
 
 
 @compiled
 def _go_through_angles(
-    model: Model, trial: Array, path: Array, travel: float, tension_limit: float
+    model: Model,
+    trial: Array,
+    tried: Array,
+    path: Array,
+    travel: float,
+    tension_limit: float,
 ) -> None:
-    """From rest, bend the joint slowly to the angles of `path`, which become those of the shaft."""
+    """From rest, bend the tip slowly to the angles of `path`, which become those of the shaft."""
     x, history, sheath, p, on, _ = model
     settle(x, history, sheath, p, on, 0.0, TICK)
     for i in range(len(path)):
         target = path[i]
-        way = 1.0 if target > x[JOINT] else -1.0
+        way = 1.0 if target > x[TIP] else -1.0
         for _ in range(_STEPS):
-            left = target - x[JOINT]
+            left = target - x[TIP]
             # A hair beyond, where damping let go: to come back would cross the dead zone.
             if way * left <= 2.0 * PRECISION:
                 break
             before = x[MOTOR]
             low = max(-travel, before - _SHAFT_STEP)
             high = min(travel, before + _SHAFT_STEP)
-            angle = x[JOINT] + min(_JOINT_STEP, max(-_JOINT_STEP, left))
+            angle = x[TIP] + min(_JOINT_STEP, max(-_JOINT_STEP, left))
             low, high = min(low, before), max(high, before)
-            _seek(model, trial, angle, low, high, tension_limit, _LONGEST_TICK)
+            _seek(model, trial, tried, angle, low, high, tension_limit, _LONGEST_TICK)
             if abs(x[MOTOR] - before) <= 1e-9:
                 break
         path[i] = x[MOTOR]
@@ -220,27 +255,52 @@ def go_through_shafts(models: Model, path: Array) -> None:
                 advance_tick(x[i], history[i], sheath[i], p[i], on[i], inputs, _LONGEST_TICK)
 
 
-def packed_joint(joint: JointParameters) -> tuple[Array, Flags]:
-    """Parameters (P,) and flags of a nominal joint, as the compiled plant takes them."""
-    parameters, on = pack(PlantDescription(joints={'joint': joint}))
+def definition_of(entry: EffectSpec | TermSpec) -> Effect:
+    """What is known of added physics by its effect, or by the place of its function."""
+    return describe(entry.id) if isinstance(entry, EffectSpec) else describe_place(entry.place)
+
+
+def plant_of_joint(joint: JointParameters, added: Added = ()) -> PlantDescription:
+    """A plant of this joint alone, with physics beyond the nominal plant."""
+    here = [replace(entry, joint=_ALONE) for entry in added]
+    return PlantDescription(
+        joints={_ALONE: joint},
+        effects=tuple(entry for entry in here if isinstance(entry, EffectSpec)),
+        terms=tuple(entry for entry in here if isinstance(entry, TermSpec)),
+    )
+
+
+def packed_joint(joint: JointParameters, added: Added = ()) -> tuple[Array, Flags]:
+    """Parameters (P,) and flags of one joint, as the compiled plant takes them."""
+    parameters, on = pack(plant_of_joint(joint, added))
     return parameters[0], on[0]
 
 
 class InternalModel:
-    """The nominal plant of one joint, at rest at first; angles of motor are the shaft's."""
+    """The plant of one joint, at rest at first; angles of motor are the shaft's."""
 
-    def __init__(self, joint: JointParameters, limits: MotorLimits) -> None:
+    def __init__(self, joint: JointParameters, limits: MotorLimits, added: Added = ()) -> None:
         self._limits = limits
-        p, on = packed_joint(joint)
+        p, on = packed_joint(joint, added)
         states, histories, sheaths = rest_state(p[None], on[None], TICK)
         self._state, self._sheath = states[0], sheaths[0]
-        self._trial, self._inputs = np.empty_like(self._state), np.zeros(INPUTS)
+        self._trial, self._tried = np.empty_like(self._state), np.empty_like(self._sheath)
+        self._inputs = np.zeros(INPUTS)
         self._model = (self._state, histories[0], self._sheath, p, on, self._inputs)
 
     @property
     def angle(self) -> float:
-        """Joint angle, rad."""
-        return float(self._state[JOINT])
+        """Tip's angle, rad."""
+        return float(self._state[TIP])
+
+    @property
+    def other(self) -> float:
+        """Angle in rad of the other joint, which may be coupled."""
+        return float(self._inputs[IN_OTHER_JOINT])
+
+    @other.setter
+    def other(self, angle: float) -> None:
+        self._inputs[IN_OTHER_JOINT] = angle
 
     @property
     def shaft(self) -> float:
@@ -264,14 +324,16 @@ class InternalModel:
         # A shaft that is beyond its travel may stay there, and come back.
         low = min(shaft, max(-m.travel, shaft - m.speed * dt))
         high = max(shaft, min(m.travel, shaft + m.speed * dt))
-        _seek(self._model, self._trial, angle, low, high, m.tension, dt)
+        _seek(self._model, self._trial, self._tried, angle, low, high, m.tension, dt)
         return abs(self.angle - angle) <= 2.0 * PRECISION
 
     def go_through(self, angles: Sequence[float]) -> list[float]:
         """Bend slowly from rest to one angle (rad) after the other; the shaft's angle at each."""
         path = np.array(angles, dtype=float)
         m = self._limits
-        _go_through_angles(self._model, self._trial, path, m.travel, m.tension)
+        _go_through_angles(
+            self._model, self._trial, self._tried, path, m.travel, m.tension
+        )
         return path.tolist()
 
 
@@ -311,13 +373,15 @@ def keep_within(
     return tuple(a for a, _ in kept), tuple(v for _, v in kept) if velocity else ()
 
 
-def bending_range(joint: JointParameters, limits: MotorLimits | None = None) -> BendingRange:
+def bending_range(
+    joint: JointParameters, limits: MotorLimits | None = None, added: Added = ()
+) -> BendingRange:
     """Find how far a joint can be bent to and fro, in rad, time and again.
 
     The motor swings slowly as far as its travel and the wires' tension allow, by default those of
     the shipped rig.
     """
-    model = InternalModel(joint, limits or shipped_limits())
+    model = InternalModel(joint, limits or shipped_limits(), added)
     there_and_back = [_BEYOND, -_BEYOND] * 2
     # A first pull from rest gets elsewhere than later ones, which begin in wires left tense.
     model.go_through(there_and_back)

@@ -4,12 +4,44 @@ from __future__ import annotations
 
 import math
 
-from endoscope_core.control.internal_model import InternalModel, PhysicalParameters, TurningPoints
+import numpy as np
+
+from endoscope_core.control.internal_model import (
+    TICK,
+    InternalModel,
+    PhysicalParameters,
+    TurningPoints,
+    definition_of,
+    plant_of_joint,
+)
 from endoscope_core.control.limits import COUNT, MotorLimits, shipped_limits
 from endoscope_core.control.plant_learning import PlantLearning, PlantLearningSettings
+from endoscope_core.physics.effect import Stage
+from endoscope_core.physics.simulator import simulate
 
 SWING = 1.0
 """Rad from which a joint is taken to have come whose motion is known by its direction alone."""
+
+
+_RAMPS, _RAMP_S = (0.1, 0.2), 5.0
+"""Speeds of a shaft in rad/s, and how long it turns, which tell the lag of a servo with effects."""
+
+
+def servo_lag(parameters: PhysicalParameters) -> float:
+    """Time in s by which the servo of a joint follows a steady motion late."""
+    joint = parameters.joint
+    if not any(definition_of(entry).stage is Stage.ACTUATOR for entry in parameters.added):
+        return 2.0 * joint.motor_damping_ratio / joint.motor_bandwidth
+    # What stays away by the same angle at any speed is no lag.
+    behind = [_behind_ramp(parameters, speed) for speed in _RAMPS]
+    return max(0.0, (behind[1] - behind[0]) / (_RAMPS[1] - _RAMPS[0]))
+
+
+def _behind_ramp(parameters: PhysicalParameters, speed: float) -> float:
+    """By what angle in rad a shaft is behind a command of this speed in the end, rad/s."""
+    command = speed * TICK * np.arange(round(_RAMP_S / TICK))
+    run = simulate(plant_of_joint(parameters.joint, parameters.added), command[:, None], TICK)
+    return float(command[-1] - run.shaft_position[-1, 0])
 
 
 class PhysicalInverse:
@@ -29,7 +61,10 @@ class PhysicalInverse:
         self.parameters = parameters
         self.limits = limits or shipped_limits()
         self._dead_band = dead_band
-        self.model = InternalModel(parameters.joint, self.limits)
+        # Time in s by which the servo follows a steady motion late.
+        self.servo_lag = servo_lag(parameters)
+        self.other = 0.0  # where the other joint is to be, rad: the two may be coupled
+        self.model = InternalModel(parameters.joint, self.limits, parameters.added)
         self._turns = TurningPoints([0.0])
         self._way = 0.0
         self._arrived = True
@@ -45,12 +80,6 @@ class PhysicalInverse:
     def arrived(self) -> bool:
         """Whether the model's joint is where it shall be: no dead zone to cross, no limit met."""
         return self._arrived
-
-    @property
-    def servo_lag(self) -> float:
-        """Time in s by which the servo follows a steady motion late, ``2 zeta / wm``."""
-        joint = self.parameters.joint
-        return 2.0 * joint.motor_damping_ratio / joint.motor_bandwidth
 
     @property
     def command(self) -> float:
@@ -73,6 +102,7 @@ class PhysicalInverse:
     def wanted(self, desired: float, velocity: float, dt: float) -> float:
         """Command (rad) for a desired angle (rad) and velocity (rad/s) `dt` s after the last."""
         target = desired + self.servo_lag * velocity
+        self.model.other = self.other
         missing = target - self.model.angle
         # At a reversal the joint stands still until the front of the turning motor has come through
         # the sheath; that dead zone is crossed as fast as the motor can. So that noise at rest does
@@ -91,7 +121,8 @@ class PhysicalInverse:
     def take(self, parameters: PhysicalParameters) -> None:
         """Go on as another plant that has come the same way."""
         self.parameters = parameters
-        self.model = InternalModel(parameters.joint, self.limits)
+        self.model = InternalModel(parameters.joint, self.limits, parameters.added)
+        self.model.other = self.other
         self.shafts = (0.0, *self.model.go_through(self._turns.values[1:]))
         self._arrived = True
 

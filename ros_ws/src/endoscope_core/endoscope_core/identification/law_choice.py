@@ -8,6 +8,7 @@ from pathlib import Path
 
 from endoscope_core.choices import (
     ADAPTIVE_PHYSICAL,
+    BY_ADOPTED,
     BY_CLASS,
     BY_PLANT,
     BY_SIZE,
@@ -48,11 +49,18 @@ class LawChoice:
         self._sets: dict[str, dict[int, LawParameters]] = {}
         self._tables: dict[str, UpdatedTable] = {}
 
-    def law(self, mode: str, selected_by: str, findings: CalibrationFindings) -> FeedforwardLaw:
+    def law(
+        self,
+        mode: str,
+        selected_by: str,
+        findings: CalibrationFindings,
+        adopted: tuple[PhysicalParameters, ...] = (),
+    ) -> FeedforwardLaw:
         """The law of a mode (one of `endoscope_core.control.MODES`) after a calibration.
 
         By 'class' it takes the class's set (first paper), by 'size' it blends the updated table at
-        the regressed backlash size, by 'plant' it takes the plant that the calibration identified.
+        the regressed backlash size, by 'plant' it takes the plant that the calibration identified,
+        by 'adopted' the one of the plant file that was put into force, for each joint.
         InputError if something is needed and was not found, since nothing is guessed; FileError if
         a file cannot be used.
         """
@@ -65,6 +73,12 @@ class LawChoice:
             if len(findings.plants) != self._joints:
                 raise InputError('the calibration did not identify the plant')
             return FeedforwardLaw(mode, findings.plants)
+        if selected_by == BY_ADOPTED:
+            if mode != PHYSICAL:
+                raise InputError(f'mode {mode} is not selected by adopted: take {PHYSICAL}')
+            if len(adopted) != self._joints:
+                raise InputError('no plant has been adopted')
+            return FeedforwardLaw(mode, adopted)
         if selected_by == BY_SIZE:
             if findings.size is None or not math.isfinite(findings.size):
                 raise InputError('the calibration did not find a backlash size')

@@ -4,9 +4,14 @@ from typing import NamedTuple
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.parameter import Parameter
 
-from endoscope_core.choices import ADAPTIVE_PHYSICAL, BY_CLASS, MODES
+from endoscope_core.choices import ADAPTIVE_PHYSICAL, BY_ADOPTED, BY_CLASS, MODES
 from endoscope_core.control import (
+    AdoptedPlant,
+    AdoptionCode,
+    AdoptionError,
+    BendingRange,
     DesiredMotion,
     Feedforward,
     FeedforwardLaw,
@@ -27,6 +32,7 @@ from endoscope_core.safety import (
 )
 from endoscope_nodes import names
 from endoscope_nodes.client.calibration_result import findings_of, is_of_no_class
+from endoscope_nodes.nodes.plant_adoption import PlantAdoption, Selection
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report, diagnostic_array, status
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
@@ -43,6 +49,8 @@ NOBODY = 'nobody'
 _AT_ZERO = (0.0,) * len(names.JOINTS)
 _NOTHING = np.zeros(len(names.JOINTS))
 _ANY_CLASS = CalibrationFindings(class_deg=70)
+# The servo has followed a command by then but for 1 %: 6 / wm of the nominal one.
+_REST_NS = 200_000_000
 
 
 class _Step(NamedTuple):
@@ -98,7 +106,10 @@ class CompensatorNode(EndoscopeNode):
         self._learnt_ns = 0
         self._source = NOBODY
         self._last_stamp_ns = 0
-        self._sent = _AT_ZERO
+        self._sent = self._rested_at = _AT_ZERO
+        self._moved_ns = 0
+        self._angle: tuple[float, ...] = _AT_ZERO
+        self._ranges: tuple[BendingRange, ...] = ()
         self._answer = StandingStill(names.MOTORS, self.rig.motors.resolution)
         self._corrections: tuple[JointSample | None, JointSample | None] = (None, None)
         self._corrected = False
@@ -123,6 +134,9 @@ class CompensatorNode(EndoscopeNode):
             DiagnosticArray, names.CALIBRATION_RESULT, self._on_result, RESULT
         )
         self._results = self._session.senders_of(results, self._doubt_results)
+        self._adoption = PlantAdoption(
+            self, self._session, self._obstacle, self._selection, self._reselect, self._in_force
+        )
         self.diagnostics.add('commands', CommandReport(self.gate, self.ticker, self._session.leave))
         self.diagnostics.add(
             'calibration commands', CommandReport(self.calibration_gate, self.ticker)
@@ -135,6 +149,38 @@ class CompensatorNode(EndoscopeNode):
     def _on_parameters(self, parameters: CompensatorParameters) -> None:
         self._settings = parameters
         self._select_law()
+        self._adoption.tell()
+
+    def _selection(self) -> Selection:
+        return self._settings.mode, self._settings.selected_by
+
+    def _reselect(self, selection: Selection) -> None:
+        mode, selected_by = selection
+        wanted = [Parameter('mode', value=mode), Parameter('selected_by', value=selected_by)]
+        self.set_parameters_atomically(wanted)
+        # Another plant may be in force under the same selection.
+        self._select_law()
+
+    def _obstacle(self, plant: AdoptedPlant | None) -> None:
+        """Refuse to adopt, or to go back to, a plant while the slave moves or is bent too far."""
+        moving = self.ticker.monotonic_ns() - self._moved_ns < _REST_NS
+        if moving or self._source == CALIBRATION:
+            raise AdoptionError(
+                AdoptionCode.MOVING, 'the slave is moving: plants are exchanged only at rest'
+            )
+        bending = self._pose.bending()
+        if bending is None:
+            raise AdoptionError(
+                AdoptionCode.NOT_MEASURED, f'{names.MOTOR_MEASURED} is silent: no pose is known'
+            )
+        before = self._angle if self._source == names.MASTER_NODE else bending
+        joint = None if plant is None else plant.outside(before)
+        if plant is not None and joint is not None:
+            within = ranges_in_words(plant.ranges[joint : joint + 1], names.JOINTS[joint:])
+            raise AdoptionError(
+                AdoptionCode.BEYOND_RANGE,
+                f'{names.JOINTS[joint]} is at {np.degrees(before[joint]):.0f} deg; {within}',
+            )
 
     def _on_result(self, message: DiagnosticArray) -> None:
         found = findings_of(message)
@@ -177,17 +223,32 @@ class CompensatorNode(EndoscopeNode):
 
     def _select_law(self) -> None:
         """Put mode and findings in force; without findings nothing is compensated."""
-        law, self._trouble = FeedforwardLaw(), ''
-        if self.findings is not None:
+        law, self._trouble, adopted = FeedforwardLaw(), '', self._adoption.plant
+        if self._is_known:
             try:
                 law = self._choice.law(
-                    self._settings.mode, self._settings.selected_by, self.findings
+                    *self._selection(),
+                    self.findings or CalibrationFindings(),
+                    () if adopted is None else adopted.parameters,
                 )
             except EndoscopeError as error:
                 self._trouble = str(error)
         if law != self._feedforward.law:
             self._feedforward.select(law)
+        if adopted is not None and law == adopted.law:
+            self._ranges = adopted.ranges
+        else:
+            self._ranges = () if self.findings is None else self.findings.ranges
         self._state_is_news = True
+
+    @property
+    def _is_known(self) -> bool:
+        """Whether what selects the feed-forward has been found: a calibration, but for a plant."""
+        return self.findings is not None or self._settings.selected_by == BY_ADOPTED
+
+    def _in_force(self) -> tuple[BendingRange, ...]:
+        """How far each joint may be bent now, in rad; empty where that is not known."""
+        return self._ranges
 
     def _restart(self) -> None:
         for gate in (self.gate, self.calibration_gate, self.correction_gate):
@@ -252,6 +313,7 @@ class CompensatorNode(EndoscopeNode):
                 self._drive_before() - added, sample.position if step.begins else None
             )
         within = self._within_range(sample)
+        self._angle = within[0]
         angle, velocity = self._desired.follow(*within, step.seconds)
         if self._news and not any(velocity):
             self._take_news()
@@ -261,9 +323,7 @@ class CompensatorNode(EndoscopeNode):
 
     def _within_range(self, sample: JointSample) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Desired angles and velocities, cut where the tube at hand lets the tip bend no more."""
-        if self.findings is None:
-            return sample.position, sample.velocity
-        angle, velocity = keep_within(self.findings.ranges, sample.position, sample.velocity)
+        angle, velocity = keep_within(self._ranges, sample.position, sample.velocity)
         if angle != sample.position:
             self._beyond_range += 1
         return angle, velocity
@@ -321,6 +381,9 @@ class CompensatorNode(EndoscopeNode):
     def _put_out(self, stamp_ns: int, drive: np.ndarray, dt: float) -> None:
         gear = self.rig.joints.gear
         self._sent = self.shaper.shape([gear * angle for angle in drive.tolist()], dt)
+        away = max(abs(a - b) for a, b in zip(self._sent, self._rested_at, strict=True))
+        if away > self.rig.motors.resolution:
+            self._rested_at, self._moved_ns = self._sent, self.ticker.monotonic_ns()
         self._motors.publish(stamp_ns, *self._sent)
 
     def _drive_before(self) -> np.ndarray:
@@ -352,6 +415,8 @@ class CompensatorNode(EndoscopeNode):
             return 'no feed-forward'
         if self._trouble:
             return f'no feed-forward: {self._trouble}'
+        if self._settings.selected_by == BY_ADOPTED and self._adoption.plant is not None:
+            return f'{self._settings.mode} by adopted: plant {self._adoption.plant.hash}'
         if self.findings is None:
             return (
                 f'no feed-forward: {self._settings.mode} waits for a calibration; '
@@ -359,15 +424,19 @@ class CompensatorNode(EndoscopeNode):
             )
         return f'{self._settings.mode} by {self._settings.selected_by}: {_in_words(self.findings)}'
 
+    def close(self) -> None:
+        """Let the thread end in which plants are tried."""
+        self._adoption.close()
+
     def _report(self) -> Report:
-        waiting = self._settings.mode != 'none' and self.findings is None
+        waiting = self._settings.mode != 'none' and not self._is_known
         level = ERROR if self._trouble else WARN if waiting else OK
         said = self._model_in_words()
         beyond = self._beyond_range - self._beyond_before
         self._beyond_before = self._beyond_range
-        if beyond and self.findings is not None:
+        if beyond:
             level = max(level, WARN)
-            said += f'; {ranges_in_words(self.findings.ranges, names.JOINTS)}, more was asked for'
+            said += f'; {ranges_in_words(self._ranges, names.JOINTS)}, more was asked for'
         return (
             level,
             said,

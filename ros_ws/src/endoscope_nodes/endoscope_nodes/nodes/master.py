@@ -23,6 +23,7 @@ from endoscope_core.safety.motion_session import STALL_NS
 from endoscope_nodes import names
 from endoscope_nodes.client.calibration_result import findings_of, is_of_no_class
 from endoscope_nodes.client.handle_sender import CLUTCH_PERIOD_NS, clutch_message
+from endoscope_nodes.client.plant_adoption import PlantInForce
 from endoscope_nodes.nodes.played_motion import (
     SampledMotion,
     approach,
@@ -110,6 +111,10 @@ class MasterNode(EndoscopeNode):
             DiagnosticArray, names.CALIBRATION_RESULT, self._on_result, RESULT
         )
         self._results = self._session.senders_of(results)
+        plants = self.create_subscription(
+            DiagnosticArray, names.COMPENSATOR_PLANT, self._on_plant, RESULT
+        )
+        self._plants = self._session.senders_of(plants)
         self._on_parameters(self._settings)
         self.diagnostics.add('commands', self._report)
         self.ticker.add(self._on_tick)
@@ -202,6 +207,14 @@ class MasterNode(EndoscopeNode):
         found = findings_of(message)
         if found is not None or is_of_no_class(message):
             self._ranges = () if found is None else found.ranges
+
+    def _on_plant(self, message: DiagnosticArray) -> None:
+        """Keep to how far the plant that has been adopted in this session lets the tip be bent."""
+        crowd = self._plants.rivals()
+        if crowd:
+            self._session.leave(crowd)
+        if self._session.belongs(message.header.frame_id):
+            self._ranges = PlantInForce.of_message(message).ranges
 
     def _rest(self) -> None:
         """Stop moving: whatever comes next begins at the measured pose."""

@@ -1,0 +1,215 @@
+"""A plant file put into force: what of it can be inverted, how far, and whether that is any use.
+
+`endoscope explain` writes a plant with all the physics that it found. A compensator inverts of it
+what stands between motor and tip and does not depend on the time since a recording began, which
+nobody knows later. What is left is tried before anything moves: the inverse of each joint, played
+through the plant itself, has to track better than no compensation at all.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.choices import PHYSICAL
+from endoscope_core.control.feedforward import Feedforward, FeedforwardLaw, FeedforwardSettings
+from endoscope_core.control.internal_model import (
+    BendingRange,
+    PhysicalParameters,
+    bending_range,
+    definition_of,
+)
+from endoscope_core.control.limits import MotorLimits
+from endoscope_core.errors import EndoscopeError, FileError
+from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.effect import Stage
+from endoscope_core.physics.packing import without_functions
+from endoscope_core.physics.plant_file import plant_from_mapping
+from endoscope_core.physics.simulator import TICK, simulate
+from endoscope_core.rig import Rig
+from endoscope_core.schema import parse_yaml
+from endoscope_core.signals import periodic_signal
+
+LARGEST_TEXT = 100_000
+"""Characters of a plant file: a hundred times the nominal one."""
+_INVERTED = (Stage.ACTUATOR, Stage.TRANSMISSION, Stage.JOINT)
+_CYCLE_S = 2.0 * math.pi
+
+Array = NDArray[np.float64]
+
+
+class AdoptionCode(StrEnum):
+    """Why a plant is not put into force, or the one before not again."""
+
+    NONE = ''
+    NOT_A_PLANT = 'not_a_plant'
+    OTHER_JOINTS = 'other_joints'
+    NOT_INVERTIBLE = 'not_invertible'
+    BEYOND_RANGE = 'beyond_range'
+    MOVING = 'moving'
+    BUSY = 'busy'
+    FAULT = 'fault'
+    NOT_MEASURED = 'not_measured'
+    NO_SESSION = 'no_session'
+    OTHER_SESSION = 'other_session'
+    OTHER_SENDER = 'other_sender'
+    NOTHING_TO_UNDO = 'nothing_to_undo'
+
+
+class AdoptionError(EndoscopeError):
+    """Why a plant is not put into force, in words and as a code."""
+
+    def __init__(self, code: AdoptionCode, words: str) -> None:
+        super().__init__(words)
+        self.code = code
+
+
+@dataclass(frozen=True)
+class AdoptedPlant:
+    """A plant as a compensator puts it into force, for J joints."""
+
+    text: str  # the plant file
+    parameters: tuple[PhysicalParameters, ...]  # (J,), what is inverted
+    ranges: tuple[BendingRange, ...]  # (J,), within the reach of the rig, rad
+    left_out: tuple[str, ...]  # what the file has and no inverse can know, `effect of joint`
+    # Rms error of the tip in rad on the trial, with the inverse and without, worst joint of J.
+    tried: tuple[float, float]
+
+    @property
+    def hash(self) -> str:
+        """The first 12 hexadecimal digits of the SHA-256 of the text."""
+        return plant_hash(self.text)
+
+    @property
+    def law(self) -> FeedforwardLaw:
+        """The feed-forward that inverts it."""
+        return FeedforwardLaw(PHYSICAL, self.parameters)
+
+    def outside(self, angles: tuple[float, ...]) -> int | None:
+        """The first joint that is bent (J,), in rad, further than the ranges; None if none is."""
+        for j, (angle, within) in enumerate(zip(angles, self.ranges, strict=True)):
+            if within.keep(angle, 0.0)[0] != angle:
+                return j
+        return None
+
+
+def plant_hash(text: str) -> str:
+    """The first 12 hexadecimal digits of the SHA-256 of a plant file's text."""
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def adopted_plant(text: str, rig: Rig, joints: tuple[str, ...]) -> AdoptedPlant:
+    """Read a plant file of these joints and try its inverse; it takes some seconds.
+
+    Raises
+    ------
+    AdoptionError
+        If the text is no plant file, is of other joints, or cannot be inverted.
+    """
+    plant = _read(text)
+    if plant.joint_names() != joints:
+        raise AdoptionError(
+            AdoptionCode.OTHER_JOINTS,
+            f'the plant describes {", ".join(plant.joints)}, the rig has {", ".join(joints)}',
+        )
+    known, left_out = _knowable(plant)
+    parameters = tuple(
+        PhysicalParameters(
+            known.joints[name],
+            tuple(entry for entry in (*known.effects, *known.terms) if entry.joint == name),
+        )
+        for name in joints
+    )
+    limits, reach = MotorLimits.of(rig), rig.joints.reach
+    ranges = []
+    for name, joint in zip(joints, parameters, strict=True):
+        found = bending_range(joint.joint, limits, joint.added)
+        within = BendingRange(max(-reach, float(found.low)), min(reach, float(found.high)))
+        if not within.low < 0.0 < within.high:
+            raise AdoptionError(
+                AdoptionCode.NOT_INVERTIBLE,
+                f'{name} of the plant cannot be bent either way from straight within the '
+                f"motors' travel and tension: from {math.degrees(found.low):.0f} to "
+                f'{math.degrees(found.high):.0f} deg',
+            )
+        ranges.append(within)
+    tried = _tried(known, parameters, ranges, limits)
+    return AdoptedPlant(text, parameters, tuple(ranges), left_out, tried)
+
+
+def _read(text: str) -> PlantDescription:
+    if len(text) > LARGEST_TEXT:
+        raise AdoptionError(
+            AdoptionCode.NOT_A_PLANT,
+            f'a plant file has at most {LARGEST_TEXT} characters, and this one {len(text)}',
+        )
+    try:
+        content = parse_yaml(text, 'the plant')
+        # A file of nothing would be the nominal plant: nobody has explained that.
+        if not content:
+            raise FileError('the plant is empty: give a plant.yaml')
+        return plant_from_mapping(content)
+    except FileError as error:
+        raise AdoptionError(AdoptionCode.NOT_A_PLANT, str(error)) from error
+
+
+def _knowable(plant: PlantDescription) -> tuple[PlantDescription, tuple[str, ...]]:
+    """The plant between motor and tip without what depends on time, and what is left out so."""
+    inverted, left_out = plant, []
+    for entry in (*plant.effects, *plant.terms):
+        known = definition_of(entry)
+        if known.stage in _INVERTED and not known.traits.depends_on_time:
+            continue
+        if known.stage in _INVERTED:
+            left_out.append(f'{known.id} of {entry.joint}')
+        if entry in inverted.effects:
+            kept = tuple(effect for effect in inverted.effects if effect is not entry)
+            inverted = replace(inverted, effects=kept)
+        else:
+            inverted = without_functions(inverted, entry.joint, {known.id})
+    return inverted, tuple(left_out)
+
+
+def _tried(
+    plant: PlantDescription,
+    parameters: tuple[PhysicalParameters, ...],
+    ranges: list[BendingRange],
+    limits: MotorLimits,
+) -> tuple[float, float]:
+    """Error of the tip in rad through the plant itself, with the inverse and without."""
+    signal = periodic_signal(_CYCLE_S)
+    time = np.arange(0.0, signal.duration, TICK)
+    angle, velocity = signal(time)
+    largest = np.array([min(-within.low, within.high) for within in ranges])
+    scale = np.minimum(1.0, largest / np.max(np.abs(angle)))
+    desired, speed = angle[:, None] * scale, velocity[:, None] * scale
+    feedforward = Feedforward(
+        len(parameters),
+        FeedforwardSettings(speed_limit=limits.speed / limits.gear, limits=limits),
+    )
+    feedforward.select(FeedforwardLaw(PHYSICAL, parameters))
+    command = np.array([feedforward.step(*now, TICK) for now in zip(desired, speed, strict=True)])
+    steady = time >= signal.steady[0]
+    with_it, without = (
+        np.sqrt(np.mean((_tip(plant, limits, sent) - desired)[steady] ** 2, axis=0))
+        for sent in (command, desired)
+    )
+    for name, error, passed in zip(plant.joints, with_it, without, strict=True):
+        # Also where it is not finite.
+        if not error < passed:
+            raise AdoptionError(
+                AdoptionCode.NOT_INVERTIBLE,
+                f'{name} of the plant cannot be inverted over the reach: through the plant itself '
+                f'the inverse misses by {math.degrees(error):.2f} deg rms, and no compensation by '
+                f'{math.degrees(passed):.2f}',
+            )
+    return float(np.max(with_it)), float(np.max(without))
+
+
+def _tip(plant: PlantDescription, limits: MotorLimits, command: Array) -> Array:
+    return simulate(plant, limits.gear * command).bending_true

@@ -1,0 +1,165 @@
+"""The messages ``compensator/adopt`` and ``compensator/plant``, and who asks by them."""
+
+import json
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.serialization import deserialize_message
+
+from endoscope_core.control import AdoptionCode, BendingRange
+from endoscope_nodes import names
+from endoscope_nodes.client.graph_client import GraphClient
+from endoscope_nodes.client.graph_listener import PATIENCE_S, GraphError
+from endoscope_nodes.client.order_feedback import OrderState
+from endoscope_nodes.runtime.diagnostics import ERROR, OK, diagnostic_array, status
+from endoscope_nodes.runtime.qos import EVENT
+
+REQUEST = 'adopt'
+IN_FORCE, ADOPTION = 'compensator: adopted plant', 'compensator: adoption'
+_REACH = 'reach.'
+
+
+class RefusedAdoptionError(GraphError):
+    """A plant was not put into force, or the one before not again: why, in words and as a code."""
+
+    def __init__(self, code: AdoptionCode, words: str) -> None:
+        super().__init__(words)
+        self.code = code
+
+
+@dataclass(frozen=True)
+class AdoptionRequest:
+    """What a compensator is asked to put into force."""
+
+    id: str  # which no other request has
+    plant: str  # text of the plant file; empty for the plant before
+    session: str  # motion session in which it is asked for
+
+    def message(self, stamp_ns: int) -> DiagnosticArray:
+        """Write it, at a time in ns."""
+        values = {'id': self.id, 'plant': self.plant}
+        message = diagnostic_array(stamp_ns, status(REQUEST, OK, '', values))
+        message.header.frame_id = self.session
+        return message
+
+    @classmethod
+    def of_message(cls, message: DiagnosticArray) -> 'AdoptionRequest | None':
+        """Read it; None where it is none."""
+        for said in message.status:
+            values = {item.key: item.value for item in said.values}
+            if said.name == REQUEST and set(values) == {'id', 'plant'}:
+                return cls(values['id'], values['plant'], message.header.frame_id)
+        return None
+
+
+@dataclass(frozen=True)
+class PlantInForce:
+    """The adopted plant of a compensator, and what became of the last request."""
+
+    plant: str = ''  # text of its file; empty where none has been adopted
+    hash: str = ''  # of that text
+    before: str = ''  # hash of the plant before, which can be put into force again
+    # What stands in the file and no inverse can know.
+    left_out: tuple[str, ...] = ()
+    # How far each of J joints may be bent in rad; empty where that is not known.
+    ranges: tuple[BendingRange, ...] = ()
+    words: str = ''  # the same for a person
+    id: str = ''  # of the last request
+    state: OrderState = OrderState.WAITING
+    code: AdoptionCode = AdoptionCode.NONE
+    answer: str = ''  # what became of it, in words
+
+    def message(self, stamp_ns: int, session: str) -> DiagnosticArray:
+        """Write it, at a time in ns, of a motion session."""
+        values: dict[str, object] = {
+            'hash': self.hash,
+            'before': self.before,
+            'left_out': json.dumps(self.left_out),
+        }
+        for joint, within in zip(names.JOINTS, self.ranges, strict=False):
+            values |= {
+                f'{_REACH}{joint}.low': float(within.low),
+                f'{_REACH}{joint}.high': float(within.high),
+            }
+        values['plant'] = self.plant
+        level = ERROR if self.state == OrderState.REJECTED else OK
+        asked = {'id': self.id, 'state': self.state, 'code': self.code}
+        message = diagnostic_array(
+            stamp_ns,
+            status(IN_FORCE, OK, self.words, values),
+            status(ADOPTION, level, self.answer, asked),
+        )
+        message.header.frame_id = session
+        return message
+
+    @classmethod
+    def of_message(cls, message: DiagnosticArray) -> 'PlantInForce':
+        """Read it."""
+        said = {each.name: each for each in message.status}
+        own = {item.key: item.value for item in said[IN_FORCE].values}
+        asked = {item.key: item.value for item in said[ADOPTION].values}
+        known = [joint for joint in names.JOINTS if f'{_REACH}{joint}.low' in own]
+        return cls(
+            own['plant'],
+            own['hash'],
+            own['before'],
+            tuple(json.loads(own['left_out'])),
+            tuple(
+                BendingRange(*(float(own[f'{_REACH}{joint}.{end}']) for end in ('low', 'high')))
+                for joint in known
+            ),
+            said[IN_FORCE].message,
+            asked['id'],
+            OrderState(asked['state']),
+            AdoptionCode(asked['code']),
+            said[ADOPTION].message,
+        )
+
+
+def adopt(client: GraphClient, plant: str, patience_s: float = PATIENCE_S) -> PlantInForce:
+    """Have a plant file's text put into force; empty: the plant before.
+
+    Raises
+    ------
+    RefusedAdoptionError
+        If it is refused: why, with a code.
+    GraphError
+        If nobody answers in time.
+    """
+    if client.state == 'FAULT':
+        client.wait_until(lambda: bool(client.why), patience_s)
+        raise RefusedAdoptionError(
+            AdoptionCode.FAULT, f'the slave is in FAULT: {client.why or "no cause"}'
+        )
+    heard: list[PlantInForce] = []
+
+    def take(data: bytes, _: int) -> None:
+        heard.append(PlantInForce.of_message(deserialize_message(data, DiagnosticArray)))
+
+    client.listen(DiagnosticArray, names.COMPENSATOR_PLANT, take, latched=True)
+    publisher = client.node.create_publisher(DiagnosticArray, names.COMPENSATOR_ADOPT, EVENT)
+    try:
+        found = client.wait_until(
+            lambda: bool(heard and publisher.get_subscription_count() and client.graph_ns),
+            patience_s,
+        )
+        if not found:
+            raise GraphError(f'no compensator takes plants in {client.where}')
+        request = AdoptionRequest(f'{time.time_ns()}', plant, client.session)
+        publisher.publish(request.message(client.graph_ns))
+        known: Sequence[PlantInForce] = ()
+
+        def is_answered() -> bool:
+            nonlocal known
+            known = [each for each in heard if each.id == request.id]
+            return bool(known) and known[-1].state != OrderState.EXECUTING
+
+        client.wait_for(is_answered, 'the compensator', patience_s)
+    finally:
+        client.node.destroy_publisher(publisher)
+    answer = known[-1]
+    if answer.state != OrderState.SUCCEEDED:
+        raise RefusedAdoptionError(answer.code, answer.answer)
+    return answer

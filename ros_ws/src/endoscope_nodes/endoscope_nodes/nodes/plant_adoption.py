@@ -1,0 +1,210 @@
+"""The compensator's part in adopting plants: who may ask, trial, and the plant before."""
+
+import dataclasses
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+
+from diagnostic_msgs.msg import DiagnosticArray
+
+from endoscope_core.choices import BY_ADOPTED, PHYSICAL
+from endoscope_core.control import (
+    AdoptedPlant,
+    AdoptionCode,
+    AdoptionError,
+    BendingRange,
+    adopted_plant,
+)
+from endoscope_nodes import names
+from endoscope_nodes.client.order_feedback import OrderState
+from endoscope_nodes.client.plant_adoption import AdoptionRequest, PlantInForce
+from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.qos import EVENT, RESULT
+from endoscope_nodes.safety.sessions import SessionWatch
+
+_LOOK_S = 0.05
+
+
+Selection = tuple[str, str]
+"""Mode of a compensator, and what selects its parameters."""
+
+
+@dataclasses.dataclass(frozen=True)
+class _Before:
+    """What was in force before a plant was adopted."""
+
+    plant: AdoptedPlant | None  # None where it was no adopted one
+    selection: Selection
+
+
+class PlantAdoption:
+    """Answers ``compensator/adopt``, and says on ``compensator/plant`` what is in force.
+
+    A request is obeyed in the motion session that it names, from one sender, and only at rest: when
+    it comes, and once the plant has been tried, which takes a moment. `obstacle` raises an
+    AdoptionError where the slave does not rest, or is bent further than a plant allows; `selected`
+    and `select` get and change what selects the feed-forward, and `ranges` says how far the joints
+    may be bent by it.
+    """
+
+    def __init__(
+        self,
+        node: EndoscopeNode,
+        session: SessionWatch,
+        obstacle: Callable[[AdoptedPlant | None], None],
+        selected: Callable[[], Selection],
+        select: Callable[[Selection], None],
+        ranges: Callable[[], tuple[BendingRange, ...]],
+    ) -> None:
+        self._node, self._session = node, session
+        self._obstacle, self._selected, self._select = obstacle, selected, select
+        self._ranges = ranges
+        self.plant: AdoptedPlant | None = None  # in force while the selection is by it
+        self._before: list[_Before] = []
+        self._request: AdoptionRequest | None = None
+        self._trying: Future[AdoptedPlant] | None = None
+        self._thread = ThreadPoolExecutor(1)
+        self._told = PlantInForce()
+        self._news = True
+        self._out = node.create_publisher(DiagnosticArray, names.COMPENSATOR_PLANT, RESULT)
+        requests = node.create_subscription(
+            DiagnosticArray, names.COMPENSATOR_ADOPT, self._on_request, EVENT
+        )
+        self._senders = session.senders_of(requests, self._on_crowd)
+        node.ticker.every(_LOOK_S, self._look)
+
+    def tell(self) -> None:
+        """Say anew what is in force."""
+        self._news = True
+
+    def close(self) -> None:
+        """Let the thread end in which plants are tried."""
+        self._thread.shutdown()
+
+    def _on_crowd(self, crowd: str) -> None:
+        """A second sender moves nothing, and neither does the first while he is there."""
+        if self._request is not None:
+            self._reject(self._request, AdoptionError(AdoptionCode.OTHER_SENDER, crowd))
+
+    def _on_request(self, message: DiagnosticArray) -> None:
+        request = AdoptionRequest.of_message(message)
+        if request is None:
+            self._node.get_logger().warning(f'{names.COMPENSATOR_ADOPT} is no request: ignored')
+            return
+        try:
+            self._check(request)
+            if not request.plant:
+                self._undo(request)
+                return
+        except AdoptionError as error:
+            self._reject(request, error)
+            return
+        self._request = request
+        self._say(request, OrderState.EXECUTING, 'trying the plant')
+        ticker = self._node.ticker
+        if ticker.paced or not ticker.simulated:
+            self._trying = self._thread.submit(self._try, request.plant)
+            return
+        self._trying = Future()
+        try:
+            self._trying.set_result(self._try(request.plant))
+        except AdoptionError as error:
+            self._trying.set_exception(error)
+
+    def _try(self, text: str) -> AdoptedPlant:
+        return adopted_plant(text, self._node.rig, names.JOINTS)
+
+    def _check(self, request: AdoptionRequest) -> None:
+        """Refuse who may not ask, or asks at the wrong time."""
+        crowd = self._senders.rivals()
+        if crowd:
+            raise AdoptionError(AdoptionCode.OTHER_SENDER, crowd)
+        self._check_session(request)
+        if self._request is not None:
+            raise AdoptionError(AdoptionCode.BUSY, 'busy: another plant is being tried')
+        self._obstacle(None)
+
+    def _check_session(self, request: AdoptionRequest) -> None:
+        if not self._session.name:
+            raise AdoptionError(
+                AdoptionCode.NO_SESSION,
+                'no motion session is open: the slave has to be ENABLED; '
+                + self._node.operate('enable'),
+            )
+        if not self._session.belongs(request.session):
+            raise AdoptionError(
+                AdoptionCode.OTHER_SESSION,
+                f'the request is of {request.session or "no session"}, and '
+                f'{self._session.name} is open',
+            )
+
+    def _undo(self, request: AdoptionRequest) -> None:
+        if not self._before:
+            raise AdoptionError(
+                AdoptionCode.NOTHING_TO_UNDO, 'no plant has been adopted: there is none before'
+            )
+        back = self._before[-1]
+        self._obstacle(back.plant)
+        self._before.pop()
+        self.plant = back.plant
+        self._select(back.selection)
+        self._say(request, OrderState.SUCCEEDED, f'undone: {self._in_words()}')
+
+    def _look(self) -> None:
+        """Put a plant that has been tried into force, where that is still wanted."""
+        request, trying = self._request, self._trying
+        if request is not None and trying is not None and trying.done():
+            self._request = self._trying = None
+            try:
+                plant = trying.result()
+                self._check_session(request)
+                self._obstacle(plant)
+            except AdoptionError as error:
+                self._reject(request, error)
+            else:
+                self._before.append(_Before(self.plant, self._selected()))
+                self.plant = plant
+                self._select((PHYSICAL, BY_ADOPTED))
+                self._say(request, OrderState.SUCCEEDED, self._in_words())
+        now = self._node.ticker.now_ns()
+        if self._news and now:
+            self._news = False
+            self._publish()
+
+    def _in_words(self) -> str:
+        if self.plant is None:
+            return 'no plant has been adopted'
+        left_out = ', '.join(self.plant.left_out)
+        return f'plant {self.plant.hash} adopted' + (
+            f' without {left_out}, which no inverse can know' if left_out else ''
+        )
+
+    def _reject(self, request: AdoptionRequest, error: AdoptionError) -> None:
+        if request is self._request:
+            self._request = self._trying = None
+        self._say(request, OrderState.REJECTED, str(error), error.code)
+
+    def _say(
+        self,
+        request: AdoptionRequest,
+        state: OrderState,
+        answer: str,
+        code: AdoptionCode = AdoptionCode.NONE,
+    ) -> None:
+        log = self._node.get_logger()
+        (log.warning if code else log.info)(answer)
+        self._told = PlantInForce(id=request.id, state=state, code=code, answer=answer)
+        self._publish()
+
+    def _publish(self) -> None:
+        plant = self.plant
+        before = self._before[-1].plant if self._before else None
+        told = dataclasses.replace(
+            self._told,
+            plant='' if plant is None else plant.text,
+            hash='' if plant is None else plant.hash,
+            before='' if before is None else before.hash,
+            left_out=() if plant is None else plant.left_out,
+            words=self._in_words(),
+            ranges=self._ranges(),
+        )
+        self._out.publish(told.message(self._node.ticker.now_ns(), self._session.name))

@@ -1,0 +1,73 @@
+"""`endoscope operate adopt` through the real nodes: tracking, refusals, undo."""
+
+import json
+
+import numpy as np
+import pytest
+from operated_graph import OperatedGraph
+
+from endoscope_core.physics import EffectSpec, PlantDescription, save_plant
+from endoscope_nodes.names import JOINTS, SLAVE_MEASURED
+
+EFFECTS = tuple(
+    EffectSpec('gear_backlash', joint, {'gap_rad': 0.3}) for joint in JOINTS
+)
+
+
+@pytest.fixture
+def plants(tmp_path):
+    for name, effects in (('described', ()), ('true', EFFECTS)):
+        save_plant(PlantDescription(effects=effects), tmp_path / f'{name}.yaml')
+    return tmp_path
+
+
+def refused(graph, *words):
+    status, out, errors = graph.run('operate', 'adopt', *map(str, words), '--json')
+    assert status == 1, out + errors
+    return json.loads(out)['code']
+
+
+def error_of_a_motion(graph):
+    """Rms error in rad of the tip over a motion that is played from its beginning."""
+    tips = graph.tips
+    graph.set('console', source='motion', motion='non_periodic')
+    graph.advance(3.0)
+    tips.clear(), graph.wanted.clear()
+    graph.advance(6.0)
+    graph.set('console', source='none')
+    graph.advance(0.6)
+    at = [w.stamp_ns for w in graph.wanted]
+    wanted = np.array([w.position for w in graph.wanted])
+    inside = [t for t in tips if at[0] <= t.stamp_ns <= at[-1]]
+    desired = [[np.interp(t.stamp_ns, at, wanted[:, j]) for j in range(2)] for t in inside]
+    return float(np.sqrt(np.mean((np.array([t.position for t in inside]) - desired) ** 2)))
+
+
+def test_the_true_plant_is_adopted_and_undone(plants):
+    overrides = {'motor_driver': {'plant_file': str(plants / 'true.yaml')}}
+    overrides['controller'] = {'active': False}
+    with OperatedGraph(plants, **overrides) as graph:
+        graph.tips = graph.listen(SLAVE_MEASURED, JOINTS)
+        assert refused(graph, plants / 'true.yaml') == 'no_session'
+        graph.enable()
+        assert refused(graph, '--undo') == 'nothing_to_undo'
+        status, out, errors = graph.run('operate', 'adopt', str(plants / 'described.yaml'))
+        assert status == 0, out + errors
+        before = error_of_a_motion(graph)
+        sent = graph.goals[-1].position
+        status, out, errors = graph.run('operate', 'adopt', str(plants / 'true.yaml'), '--json')
+        assert status == 0, out + errors
+        assert graph.goals[-1].position == sent
+        after = error_of_a_motion(graph)
+        print('ERR', np.degrees([before, after]))
+        assert after < 0.5 * before
+        graph.set('console', source='motion', motion='non_periodic')
+        graph.advance(2.0)
+        assert refused(graph, '--undo') == 'moving'
+        graph.set('console', source='none')
+        graph.advance(0.6)
+        status, out, errors = graph.run('operate', 'adopt', '--undo', '--json')
+        assert status == 0, out + errors
+        again = error_of_a_motion(graph)
+        print('AGAIN', np.degrees(again))
+        assert again == pytest.approx(before, rel=0.3)
