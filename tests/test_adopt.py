@@ -9,9 +9,7 @@ from operated_graph import OperatedGraph
 from endoscope_core.physics import EffectSpec, PlantDescription, save_plant
 from endoscope_nodes.names import JOINTS, SLAVE_MEASURED
 
-EFFECTS = tuple(
-    EffectSpec('gear_backlash', joint, {'gap_rad': 0.3}) for joint in JOINTS
-)
+EFFECTS = tuple(EffectSpec('gear_backlash', joint, {'gap_rad': 0.3}) for joint in JOINTS)
 
 
 @pytest.fixture
@@ -32,7 +30,8 @@ def error_of_a_motion(graph):
     tips = graph.tips
     graph.set('console', source='motion', motion='non_periodic')
     graph.advance(3.0)
-    tips.clear(), graph.wanted.clear()
+    tips.clear()
+    graph.wanted.clear()
     graph.advance(6.0)
     graph.set('console', source='none')
     graph.advance(0.6)
@@ -59,7 +58,6 @@ def test_the_true_plant_is_adopted_and_undone(plants):
         assert status == 0, out + errors
         assert graph.goals[-1].position == sent
         after = error_of_a_motion(graph)
-        print('ERR', np.degrees([before, after]))
         assert after < 0.5 * before
         graph.set('console', source='motion', motion='non_periodic')
         graph.advance(2.0)
@@ -69,5 +67,4 @@ def test_the_true_plant_is_adopted_and_undone(plants):
         status, out, errors = graph.run('operate', 'adopt', '--undo', '--json')
         assert status == 0, out + errors
         again = error_of_a_motion(graph)
-        print('AGAIN', np.degrees(again))
         assert again == pytest.approx(before, rel=0.3)

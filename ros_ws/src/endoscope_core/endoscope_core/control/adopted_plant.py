@@ -21,12 +21,13 @@ from endoscope_core.control.feedforward import Feedforward, FeedforwardLaw, Feed
 from endoscope_core.control.internal_model import (
     BendingRange,
     PhysicalParameters,
+    added_to,
     bending_range,
     definition_of,
 )
 from endoscope_core.control.limits import MotorLimits
 from endoscope_core.errors import EndoscopeError, FileError
-from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.effect import Stage
 from endoscope_core.physics.packing import without_functions
 from endoscope_core.physics.plant_file import plant_from_mapping
@@ -121,7 +122,7 @@ def adopted_plant(text: str, rig: Rig, joints: tuple[str, ...]) -> AdoptedPlant:
     parameters = tuple(
         PhysicalParameters(
             known.joints[name],
-            tuple(entry for entry in (*known.effects, *known.terms) if entry.joint == name),
+            tuple(entry for entry in added_to(known) if entry.joint == name),
         )
         for name in joints
     )
@@ -161,13 +162,13 @@ def _read(text: str) -> PlantDescription:
 def _knowable(plant: PlantDescription) -> tuple[PlantDescription, tuple[str, ...]]:
     """The plant between motor and tip without what depends on time, and what is left out so."""
     inverted, left_out = plant, []
-    for entry in (*plant.effects, *plant.terms):
+    for entry in added_to(plant):
         known = definition_of(entry)
         if known.stage in _INVERTED and not known.traits.depends_on_time:
             continue
         if known.stage in _INVERTED:
             left_out.append(f'{known.id} of {entry.joint}')
-        if entry in inverted.effects:
+        if isinstance(entry, EffectSpec):
             kept = tuple(effect for effect in inverted.effects if effect is not entry)
             inverted = replace(inverted, effects=kept)
         else:

@@ -141,7 +141,8 @@ class FeedforwardLaw:
                 raise ValueError(
                     f'mode {self.mode!r} needs {kind.__name__}, not {type(given).__name__}'
                 )
-            if self.mode == ADAPTIVE_PHYSICAL and getattr(given, 'added', ()):
+            adaptive = self.mode == ADAPTIVE_PHYSICAL
+            if adaptive and isinstance(given, PhysicalParameters) and given.added:
                 raise ValueError(f'mode {self.mode!r} learns a nominal plant, not one with effects')
 
 

@@ -260,6 +260,11 @@ def definition_of(entry: EffectSpec | TermSpec) -> Effect:
     return describe(entry.id) if isinstance(entry, EffectSpec) else describe_place(entry.place)
 
 
+def added_to(plant: PlantDescription) -> Added:
+    """All physics of a plant beyond the nominal one."""
+    return (*plant.effects, *plant.terms)
+
+
 def plant_of_joint(joint: JointParameters, added: Added = ()) -> PlantDescription:
     """A plant of this joint alone, with physics beyond the nominal plant."""
     here = [replace(entry, joint=_ALONE) for entry in added]
@@ -331,9 +336,7 @@ class InternalModel:
         """Bend slowly from rest to one angle (rad) after the other; the shaft's angle at each."""
         path = np.array(angles, dtype=float)
         m = self._limits
-        _go_through_angles(
-            self._model, self._trial, self._tried, path, m.travel, m.tension
-        )
+        _go_through_angles(self._model, self._trial, self._tried, path, m.travel, m.tension)
         return path.tolist()
 
 
