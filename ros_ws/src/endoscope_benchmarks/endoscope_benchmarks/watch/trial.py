@@ -52,8 +52,10 @@ def derived(rows: Sequence[Watched]) -> str:
         roots = np.sqrt([row.largest[part] for row in rows])
         scale = float(np.std(roots)) * math.sqrt(6.0) / math.pi
         place = float(np.mean(roots)) - np.euler_gamma * scale
-        threshold = float(f'{max((place + scale * quantile) ** 2, -math.log(share)):.3g}')
         largest = max(row.largest[part] for row in rows)
+        # A tail heavier than the law's shows in the largest one, which is no alarm either.
+        least = max(largest, -math.log(share))
+        threshold = float(f'{max((place + scale * quantile) ** 2, least):.3g}')
         lines.append(f"    '{part}': {threshold!r},  # largest seen: {largest:.3g}")
     first, last = rows[0].seed, rows[-1].seed
     return (
