@@ -69,7 +69,7 @@ class PlantAdoption:
         requests = node.create_subscription(
             DiagnosticArray, names.COMPENSATOR_ADOPT, self._on_request, EVENT
         )
-        self._senders = session.senders_of(requests, self._on_crowd)
+        self._senders = session.senders_of(requests, self._on_rivals)
         node.ticker.every(_LOOK_S, self._look)
 
     def tell(self) -> None:
@@ -80,10 +80,10 @@ class PlantAdoption:
         """Let the thread end in which plants are tried."""
         self._thread.shutdown()
 
-    def _on_crowd(self, crowd: str) -> None:
+    def _on_rivals(self, rivals: str) -> None:
         """A second sender moves nothing, and neither does the first while he is there."""
         if self._request is not None:
-            self._reject(self._request, AdoptionError(AdoptionCode.OTHER_SENDER, crowd))
+            self._reject(self._request, AdoptionError(AdoptionCode.OTHER_SENDER, rivals))
 
     def _on_request(self, message: DiagnosticArray) -> None:
         request = AdoptionRequest.of_message(message)
@@ -115,9 +115,9 @@ class PlantAdoption:
 
     def _check(self, request: AdoptionRequest) -> None:
         """Refuse who may not ask, or asks at the wrong time."""
-        crowd = self._senders.rivals()
-        if crowd:
-            raise AdoptionError(AdoptionCode.OTHER_SENDER, crowd)
+        rivals = self._senders.rivals()
+        if rivals:
+            raise AdoptionError(AdoptionCode.OTHER_SENDER, rivals)
         self._check_session(request)
         if self._request is not None:
             raise AdoptionError(AdoptionCode.BUSY, 'busy: another plant is being tried')

@@ -1,0 +1,74 @@
+"""What of a plant file is put into force, and why it is refused."""
+
+import numpy as np
+import pytest
+
+from endoscope_core.control import AdoptionCode, AdoptionError, adopted_plant, plant_hash
+from endoscope_core.physics import EffectSpec, PlantDescription
+from endoscope_core.physics.plant_file import plant_as_text
+from endoscope_core.rig import load_rig
+from endoscope_core.signals.command_file import JOINTS
+
+RIG = load_rig()
+
+
+def text_with(*effects):
+    return plant_as_text(PlantDescription(effects=effects))
+
+
+@pytest.fixture(scope='module')
+def with_play():
+    return adopted_plant(
+        text_with(
+            EffectSpec('gear_backlash', 'bend_x', {'gap_rad': 0.3}),
+            EffectSpec('breathing', 'bend_y', {}),
+        ),
+        RIG,
+        JOINTS,
+    )
+
+
+def refused(text, rig=RIG):
+    with pytest.raises(AdoptionError) as error:
+        adopted_plant(text, rig, JOINTS)
+    assert '\n' not in str(error.value)
+    return error.value.code
+
+
+def test_the_inverse_has_what_stands_between_motor_and_tip(with_play):
+    assert [entry.id for entry in with_play.parameters[0].added] == ['gear_backlash']
+    assert with_play.parameters[1].added == ()
+    with_it, without = with_play.tried
+    assert with_it < without
+
+
+def test_what_depends_on_time_is_left_out_and_named(with_play):
+    assert with_play.left_out == ('breathing of bend_y',)
+
+
+def test_the_range_is_within_the_reach_of_the_rig(with_play):
+    ends = np.array([(within.low, within.high) for within in with_play.ranges])
+    assert np.all(np.abs(ends) <= RIG.joints.reach)
+    assert with_play.outside((0.0, 0.0)) is None
+    assert with_play.outside((0.0, 1.01 * ends[1, 1])) == 1
+
+
+def test_it_is_known_by_its_text(with_play):
+    assert with_play.hash == plant_hash(with_play.text) != plant_hash(with_play.text + ' ')
+
+
+NO_PLANTS = ('', 'joints: [', 'joints: {bend_x: {stiff: 1}}', 'x' * 100_001)
+
+
+@pytest.mark.parametrize('text', NO_PLANTS)
+def test_what_is_no_plant_is_refused(text):
+    assert refused(text) == AdoptionCode.NOT_A_PLANT
+
+
+def test_a_plant_of_other_joints_is_refused():
+    assert refused('joints: {bend_x: {}}') == AdoptionCode.OTHER_JOINTS
+
+
+def test_a_plant_whose_inverse_gains_nothing_is_refused():
+    weak = EffectSpec('torque_limit', 'bend_x', {'limit_nm': 0.001})
+    assert refused(text_with(weak)) == AdoptionCode.NOT_INVERTIBLE
