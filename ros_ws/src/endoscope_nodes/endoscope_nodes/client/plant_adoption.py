@@ -95,27 +95,32 @@ class PlantInForce:
         return message
 
     @classmethod
-    def of_message(cls, message: DiagnosticArray) -> 'PlantInForce':
-        """Read it."""
+    def of_message(cls, message: DiagnosticArray) -> 'PlantInForce | None':
+        """Read it; None where it is none."""
         said = {each.name: each for each in message.status}
+        if not {IN_FORCE, ADOPTION} <= set(said):
+            return None
         own = {item.key: item.value for item in said[IN_FORCE].values}
         asked = {item.key: item.value for item in said[ADOPTION].values}
         known = [joint for joint in names.JOINTS if f'{_REACH}{joint}.low' in own]
-        return cls(
-            own['plant'],
-            own['hash'],
-            own['before'],
-            tuple(json.loads(own['left_out'])),
-            tuple(
-                BendingRange(*(float(own[f'{_REACH}{joint}.{end}']) for end in ('low', 'high')))
-                for joint in known
-            ),
-            said[IN_FORCE].message,
-            asked['id'],
-            OrderState(asked['state']),
-            AdoptionCode(asked['code']),
-            said[ADOPTION].message,
-        )
+        try:
+            return cls(
+                own['plant'],
+                own['hash'],
+                own['before'],
+                tuple(map(str, json.loads(own['left_out']))),
+                tuple(
+                    BendingRange(*(float(own[f'{_REACH}{joint}.{end}']) for end in ('low', 'high')))
+                    for joint in known
+                ),
+                said[IN_FORCE].message,
+                asked['id'],
+                OrderState(asked['state']),
+                AdoptionCode(asked['code']),
+                said[ADOPTION].message,
+            )
+        except (KeyError, ValueError, TypeError):
+            return None
 
 
 def adopt(client: GraphClient, plant: str, patience_s: float = PATIENCE_S) -> PlantInForce:
@@ -136,7 +141,9 @@ def adopt(client: GraphClient, plant: str, patience_s: float = PATIENCE_S) -> Pl
     heard: list[PlantInForce] = []
 
     def take(data: bytes, _: int) -> None:
-        heard.append(PlantInForce.of_message(deserialize_message(data, DiagnosticArray)))
+        told = PlantInForce.of_message(deserialize_message(data, DiagnosticArray))
+        if told is not None:
+            heard.append(told)
 
     client.listen(DiagnosticArray, names.COMPENSATOR_PLANT, take, latched=True)
     publisher = client.node.create_publisher(DiagnosticArray, names.COMPENSATOR_ADOPT, EVENT)

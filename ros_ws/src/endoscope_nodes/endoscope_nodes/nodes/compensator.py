@@ -109,7 +109,7 @@ class CompensatorNode(EndoscopeNode):
         self._sent = self._rested_at = _AT_ZERO
         self._moved_ns = 0
         self._angle: tuple[float, ...] = _AT_ZERO
-        self._ranges: tuple[BendingRange, ...] = ()
+        self._by_adopted = False
         self._answer = StandingStill(names.MOTORS, self.rig.motors.resolution)
         self._corrections: tuple[JointSample | None, JointSample | None] = (None, None)
         self._corrected = False
@@ -135,7 +135,7 @@ class CompensatorNode(EndoscopeNode):
         )
         self._results = self._session.senders_of(results, self._doubt_results)
         self._adoption = PlantAdoption(
-            self, self._session, self._obstacle, self._selection, self._reselect, self._in_force
+            self, self._session, self._obstacle, self._selection, self._reselect, self._ranges
         )
         self.diagnostics.add('commands', CommandReport(self.gate, self.ticker, self._session.leave))
         self.diagnostics.add(
@@ -235,10 +235,7 @@ class CompensatorNode(EndoscopeNode):
                 self._trouble = str(error)
         if law != self._feedforward.law:
             self._feedforward.select(law)
-        if adopted is not None and law == adopted.law:
-            self._ranges = adopted.ranges
-        else:
-            self._ranges = () if self.findings is None else self.findings.ranges
+        self._by_adopted = adopted is not None and law == adopted.law
         self._state_is_news = True
 
     @property
@@ -246,9 +243,11 @@ class CompensatorNode(EndoscopeNode):
         """Whether what selects the feed-forward has been found: a calibration, but for a plant."""
         return self.findings is not None or self._settings.selected_by == BY_ADOPTED
 
-    def _in_force(self) -> tuple[BendingRange, ...]:
+    def _ranges(self) -> tuple[BendingRange, ...]:
         """How far each joint may be bent now, in rad; empty where that is not known."""
-        return self._ranges
+        if self._by_adopted and self._adoption.plant is not None:
+            return self._adoption.plant.ranges
+        return () if self.findings is None else self.findings.ranges
 
     def _restart(self) -> None:
         for gate in (self.gate, self.calibration_gate, self.correction_gate):
@@ -323,7 +322,7 @@ class CompensatorNode(EndoscopeNode):
 
     def _within_range(self, sample: JointSample) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Desired angles and velocities, cut where the tube at hand lets the tip bend no more."""
-        angle, velocity = keep_within(self._ranges, sample.position, sample.velocity)
+        angle, velocity = keep_within(self._ranges(), sample.position, sample.velocity)
         if angle != sample.position:
             self._beyond_range += 1
         return angle, velocity
@@ -436,7 +435,7 @@ class CompensatorNode(EndoscopeNode):
         self._beyond_before = self._beyond_range
         if beyond:
             level = max(level, WARN)
-            said += f'; {ranges_in_words(self._ranges, names.JOINTS)}, more was asked for'
+            said += f'; {ranges_in_words(self._ranges(), names.JOINTS)}, more was asked for'
         return (
             level,
             said,

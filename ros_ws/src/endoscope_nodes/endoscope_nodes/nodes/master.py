@@ -210,11 +210,15 @@ class MasterNode(EndoscopeNode):
 
     def _on_plant(self, message: DiagnosticArray) -> None:
         """Keep to how far the plant that has been adopted in this session lets the tip be bent."""
-        crowd = self._plants.rivals()
-        if crowd:
-            self._session.leave(crowd)
-        if self._session.belongs(message.header.frame_id):
-            self._ranges = PlantInForce.of_message(message).ranges
+        rivals = self._plants.rivals()
+        if rivals:
+            self._session.leave(rivals)
+            return
+        plant = PlantInForce.of_message(message)
+        if plant is None:
+            self.get_logger().warning(f'{names.COMPENSATOR_PLANT} cannot be read: ignored')
+        elif self._session.belongs(message.header.frame_id):
+            self._ranges = plant.ranges
 
     def _rest(self) -> None:
         """Stop moving: whatever comes next begins at the measured pose."""
