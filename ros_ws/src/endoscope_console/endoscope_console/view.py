@@ -13,7 +13,14 @@ from endoscope_console.operations import Operations
 from endoscope_console.teleop.operator import STATE_NS, DeadManState, Reason
 from endoscope_core.rig import Rig
 from endoscope_nodes.client.graph_client import GraphClient
-from endoscope_nodes.client.graph_listener import COMMANDS, LOCK_STEP, MASTER, RECORDER, Health
+from endoscope_nodes.client.graph_listener import (
+    COMMANDS,
+    LOCK_STEP,
+    MASTER,
+    RECORDER,
+    SUPERVISOR,
+    Health,
+)
 from endoscope_nodes.names import WIRES
 
 _LEVELS = ('ok', 'warning', 'error', 'stale')
@@ -126,7 +133,7 @@ class View:
         return 'real' if said is None else f'simulated, {said.message}'
 
     def _causes(self) -> list[str]:
-        said = self._client.health.get('supervisor: operating state')
+        said = self._client.health.get(SUPERVISOR)
         text = '' if said is None else said.values.get('present causes', '')
         return [cause for cause in text.split('; ') if cause]
 

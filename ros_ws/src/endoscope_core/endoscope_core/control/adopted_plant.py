@@ -8,7 +8,6 @@ through the plant itself, has to track better than no compensation at all.
 
 from __future__ import annotations
 
-import hashlib
 import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -32,7 +31,7 @@ from endoscope_core.physics.effect import Stage
 from endoscope_core.physics.packing import without_functions
 from endoscope_core.physics.plant_file import plant_from_mapping
 from endoscope_core.physics.simulator import TICK, simulate
-from endoscope_core.rig import Rig
+from endoscope_core.rig import Rig, digest
 from endoscope_core.schema import parse_yaml
 from endoscope_core.signals import periodic_signal
 
@@ -101,7 +100,7 @@ class AdoptedPlant:
 
 def plant_hash(text: str) -> str:
     """The first 12 hexadecimal digits of the SHA-256 of a plant file's text."""
-    return hashlib.sha256(text.encode()).hexdigest()[:12]
+    return digest(text)[:12]
 
 
 def adopted_plant(text: str, rig: Rig, joints: tuple[str, ...]) -> AdoptedPlant:

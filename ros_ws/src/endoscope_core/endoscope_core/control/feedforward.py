@@ -235,10 +235,10 @@ class Feedforward:
                 f'parameters for {len(law.parameters)} joints given, {self._count} wanted'
             )
         self.law = law
+        desired = [joint.desired for joint in self._joints]
         for j, joint in enumerate(self._joints):
             before = joint.inverse.direction
-            joint.inverse = self._inverse(j)
-            self._couple([each.desired for each in self._joints])
+            joint.inverse = self._inverse(j, desired)
             joint.wanted = joint.inverse.begin(before, joint.desired, joint.velocity)
             joint.offset = joint.command - joint.wanted
 
@@ -321,22 +321,22 @@ class Feedforward:
     def _begin(self, angles: list[float], speeds: list[float]) -> None:
         start = self._start
         for j, (angle, speed) in enumerate(zip(angles, speeds, strict=True)):
-            inverse = self._inverse(j)
-            if isinstance(inverse, PhysicalInverse):
-                inverse.other = _other_than(j, angles)
+            inverse = self._inverse(j, angles)
             wanted = inverse.begin(0.0, angle, speed)
             command = wanted if start is None else start[j]
             self._joints.append(_Joint(inverse, angle, speed, wanted, command, command - wanted))
 
-    def _inverse(self, number: int) -> JointInverse:
+    def _inverse(self, number: int, angles: Sequence[float]) -> JointInverse:
+        """The inverse of a joint where the joints are to be at these angles (J,) in rad."""
         if self.law.mode == 'none':
             return Passing(self.settings.resting_travel)
         parameters = self.law.parameters[number]
         if not isinstance(parameters, PhysicalParameters):
             return HysteresisInverse(parameters, self.settings.lead, self.settings.dead_band)
-        if self.law.mode == PHYSICAL:
-            return PhysicalInverse(parameters, self.settings.limits, self.settings.dead_band)
-        return AdaptivePhysicalInverse(parameters, self.settings.limits, self.settings.dead_band)
+        kind = PhysicalInverse if self.law.mode == PHYSICAL else AdaptivePhysicalInverse
+        inverse = kind(parameters, self.settings.limits, self.settings.dead_band)
+        inverse.other = _other_than(number, angles)
+        return inverse
 
     def _checked(self, name: str, values: Vector) -> list[float]:
         numbers = list(map(float, values))

@@ -32,6 +32,7 @@ from endoscope_bags.recording_session import (
 from endoscope_bags.topic import QosProfile
 from endoscope_core.atomic_output import with_final_names
 from endoscope_core.errors import nearest
+from endoscope_nodes.client.graph_listener import SUPERVISOR
 from endoscope_nodes.names import (
     DIAGNOSTICS,
     LAST_EVENT,
@@ -65,7 +66,6 @@ _AFTER_NS = 2 * _SECOND
 """How long the bag of an event goes on after the last of its events."""
 _REASON_NS = 1_500_000_000
 """How long the reason of a fault, which the supervisor tells every second, is waited for."""
-_STATE_OF_SUPERVISOR = 'supervisor: operating state'
 
 
 @dataclass
@@ -457,7 +457,7 @@ class RecorderNode(EndoscopeNode):
             self._end_event()
 
     def _look_for_reason(self, event: EventBag, arrivals: list[Arrival]) -> None:
-        wanted = f'{self.get_namespace().rstrip("/")}/{_STATE_OF_SUPERVISOR}'
+        wanted = f'{self.get_namespace().rstrip("/")}/{SUPERVISOR}'
         for arrival in arrivals:
             if self._sources[arrival.topic].name != DIAGNOSTICS:
                 continue
