@@ -50,7 +50,7 @@ class WatchedSession(RecordedSession):
 
     def say(self, state):
         self.state.publish(String(data=state))
-        self.wait(lambda: self.recorder._state == state)
+        self.wait(lambda: self.recorder._events.state == state)
 
     def fault(self, cause=CAUSE):
         self.say('ENABLED')
@@ -62,12 +62,12 @@ class WatchedSession(RecordedSession):
             self.health.publish(DiagnosticArray(status=[status]))
 
     def kept(self):
-        self.wait(lambda: self.recorder._event is not None)
-        self.wait(lambda: self.recorder._event is None)
+        self.wait(lambda: self.recorder._events.event is not None)
+        self.wait(lambda: self.recorder._events.event is None)
         return event_bags(self.folder)
 
     def said(self):
-        level, message, _ = self.recorder._report_events()
+        level, message, _ = self.recorder._events.report()
         return level, message
 
 
@@ -110,7 +110,7 @@ def test_a_fault_whose_reason_nobody_tells_is_kept_all_the_same(tmp_path):
 def test_a_mark_while_a_fault_is_written_is_noted_in_the_same_bag(tmp_path):
     with WatchedSession(tmp_path) as session:
         session.fault()
-        session.wait(lambda: session.recorder._event.session)
+        session.wait(lambda: session.recorder._events.event.session)
         session.serve(1.0)
         session.marks.publish(String(data='  the wire has slipped '))
         [path] = session.kept()
@@ -141,7 +141,7 @@ def test_a_node_that_ends_finishes_what_it_writes(tmp_path):
     with WatchedSession(tmp_path) as session:
         session.serve(0.5)
         session.marks.publish(String())
-        session.wait(lambda: session.recorder._event is not None)
+        session.wait(lambda: session.recorder._events.event is not None)
     [path] = event_bags(tmp_path)
     bag = open_bag(path)
     assert [(e.kind, e.reason) for e in events_of(bag.metadata)] == [('mark', 'by the operator')]

@@ -1,7 +1,4 @@
-"""Records topics into a bag: every message as it came, counted, with what was lost.
-
-The last seconds are kept in memory all the time, for the bag of a fault or of an operator's mark.
-"""
+"""Records topics into a bag: every message as it came, counted, with what was lost."""
 
 import itertools
 import math
@@ -11,18 +8,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.qos import DurabilityPolicy
-from rclpy.serialization import deserialize_message
 from rclpy.validate_topic_name import validate_topic_name
 from std_msgs.msg import String
 
 from endoscope_bags.errors import BagError, UnknownTypeError
-from endoscope_bags.event_bag import FAULT, MARK, EventBag, held_since, new_event_bag
+from endoscope_bags.event_bag import held_since
 from endoscope_bags.message_types import begins_with_header, message_type
-from endoscope_bags.recent_messages import RecentMessages, packed
 from endoscope_bags.recording_session import (
     Arrival,
     RecordingSession,
@@ -32,23 +26,19 @@ from endoscope_bags.recording_session import (
 from endoscope_bags.topic import QosProfile
 from endoscope_core.atomic_output import with_final_names
 from endoscope_core.errors import nearest
-from endoscope_nodes.client.graph_listener import SUPERVISOR
 from endoscope_nodes.names import (
-    DIAGNOSTICS,
-    LAST_EVENT,
-    MARKS,
     MOTION_SESSION,
     OPERATING_STATE,
-    RECORDER_MARK,
     RECORDER_START,
     RECORDER_STOP,
 )
+from endoscope_nodes.nodes.event_keeping import EventKeeping
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
 from endoscope_nodes.runtime.node_parameters import RecorderParameters
 from endoscope_nodes.runtime.parameters import ParameterError
-from endoscope_nodes.runtime.qos import EVENT, RESULT
+from endoscope_nodes.runtime.qos import RESULT
 from endoscope_nodes.runtime.recorded_topics import (
     message_class,
     offered_profiles,
@@ -62,10 +52,6 @@ _SECOND = 1_000_000_000
 _LOOK_PERIOD_S = 0.1
 _UNTYPED_S = 2.0
 _MEGABYTE = 1_000_000
-_AFTER_NS = 2 * _SECOND
-"""How long the bag of an event goes on after the last of its events."""
-_REASON_NS = 1_500_000_000
-"""How long the reason of a fault, which the supervisor tells every second, is waited for."""
 
 
 @dataclass
@@ -108,16 +94,14 @@ class RecorderNode(EndoscopeNode):
         p = self.parameters(RecorderParameters, self._on_parameters)
         self._bag = p.bag
         self._topics = checked_names(p.topics)
-        self._recent = RecentMessages(p.keep, p.keep_room * _MEGABYTE)
-        self._keeps = p.keep > 0.0
-        self._most_events = p.keep_bags
-        self._event: EventBag | None = None
-        self._event_ends_ns = 0
-        self._event_begins_ns = 0
-        self._event_trouble = ''
-        self._marks = 0
-        self._last_event = ''
-        self._state = ''
+        self._events = EventKeeping(
+            self,
+            p,
+            collect=self._collect,
+            folder=lambda: Path(self._bag or new_bag()).parent,
+            open_session=self._new_session,
+            topic=lambda number: self._sources[number].name,
+        )
         self._holding: set[int] = set()
         self._asked_for = p.topics != RecorderParameters().topics
         self._said_untyped_s = 0.0
@@ -143,13 +127,11 @@ class RecorderNode(EndoscopeNode):
             _LOOK_PERIOD_S, self._look_around, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
         self.diagnostics.add('recording', self._report)
-        self.diagnostics.add('events', self._report_events)
+        self.diagnostics.add('events', self._events.report)
         if self._unasked:
             self.ticker.every(1.0, self._end_unasked)
-        if self._unasked or self._keeps:
+        if self._unasked or self._events.keeps:
             self.create_subscription(String, OPERATING_STATE, self._on_state, RESULT)
-        if self._keeps:
-            self.create_subscription(String, RECORDER_MARK, self._on_mark, EVENT)
         self._subscribe_untyped()
         if p.autostart and (p.bag or self._unasked):
             try:
@@ -175,7 +157,7 @@ class RecorderNode(EndoscopeNode):
         # What came before is no part of it, but what is in force.
         self._collect(now_ns)
         self._session = self._new_session(path)
-        self._session.accept(held_since(self._recent.in_force, now_ns))
+        self._session.accept(held_since(self._events.recent.in_force, now_ns))
         self._said_loss = 0
         self._said_untyped_s = time.monotonic() + _UNTYPED_S
         self.get_logger().info(f'recording to {with_final_names(str(path))}')
@@ -206,9 +188,7 @@ class RecorderNode(EndoscopeNode):
         """Finish what is being written."""
         if self._session is not None:
             self.stop()
-        if self._event is not None:
-            self._collect(self.ticker.now_ns())
-            self._end_event()
+        self._events.close()
         for source in self._sources:
             source.subscription.close()
         self._sources = []
@@ -231,9 +211,7 @@ class RecorderNode(EndoscopeNode):
         return report.complete, str(report)
 
     def _on_state(self, message: String) -> None:
-        before, self._state = self._state, message.data
-        if self._keeps and before and before != self._state == 'FAULT':
-            self._on_event(FAULT)
+        self._events.on_state(message.data)
         enabled = message.data == 'ENABLED'
         if enabled or not self._active_ns:
             self._active_ns = self.ticker.monotonic_ns()
@@ -300,7 +278,7 @@ class RecorderNode(EndoscopeNode):
         source.offered = offered_profiles(publishers)
         self._sources.append(source)
         self._note_whether_it_holds(source)
-        for session in (self._session, self._event.session if self._event else None):
+        for session in (self._session, self._events.session):
             if session is not None:
                 self._announce(source, session)
 
@@ -396,105 +374,13 @@ class RecorderNode(EndoscopeNode):
                 arrivals.append(
                     Arrival(received, number, info['publication_sequence_number'], published, data)
                 )
-        self._recent.add(arrivals, self._holding, now_ns)
+        self._events.recent.add(arrivals, self._holding, now_ns)
         if session is not None:
             if arrivals:
                 session.accept(arrivals)
             if not simulated:
                 session.flush_stale(now_ns)
-        if self._event is not None:
-            self._go_on_with(self._event, arrivals)
-
-    def _on_mark(self, message: String) -> None:
-        self._marks += 1
-        self._on_event(MARK, message.data.strip() or 'by the operator')
-        # Whoever asked waits for the answer.
-        self.diagnostics.publish()
-
-    def _on_event(self, kind: str, reason: str = '') -> None:
-        """Keep what came before in a bag, or note one more event of the bag that is written."""
-        now_ns, steady_ns = self.ticker.now_ns(), self.ticker.monotonic_ns()
-        if not now_ns:
-            return
-        self._event_ends_ns = steady_ns + _AFTER_NS
-        self._event_begins_ns = steady_ns + _REASON_NS
-        if self._event is not None:
-            self._event.add(kind, now_ns, reason)
-            return
-        self._collect(now_ns)
-        self._event = EventBag(self._recent, kind, now_ns, reason)
-        if reason:
-            self._begin_event(self._event)
-
-    def _begin_event(self, event: EventBag) -> None:
-        folder = Path(self._bag or new_bag()).parent
-        try:
-            path = new_event_bag(folder, event.kind, self._most_events)
-            event.begin(lambda records: self._new_session(path, records))
-        except BagError as error:
-            self._event = None
-            self._say_event_trouble(f'no bag of the {event.events[0]}: {error}')
-            return
-        self._event_trouble, self._last_event = '', str(path)
-        self.get_logger().info(f'{event.events[0]}: what led to it goes to {path}')
-
-    def _say_event_trouble(self, what: str) -> None:
-        self._event_trouble = what
-        self.exit_code = 1
-        self.get_logger().error(what)
-        self.diagnostics.publish()
-
-    def _go_on_with(self, event: EventBag, arrivals: list[Arrival]) -> None:
-        steady_ns = self.ticker.monotonic_ns()
-        if event.lacks_reason:
-            self._look_for_reason(event, arrivals)
-        event.arrive(packed(arrivals), len(arrivals))
-        if event.session is None:
-            if not event.lacks_reason or steady_ns >= self._event_begins_ns:
-                self._begin_event(event)
-            return
-        if event.session.full or (steady_ns >= self._event_ends_ns and event.caught_up):
-            self._end_event()
-
-    def _look_for_reason(self, event: EventBag, arrivals: list[Arrival]) -> None:
-        wanted = f'{self.get_namespace().rstrip("/")}/{SUPERVISOR}'
-        for arrival in arrivals:
-            if self._sources[arrival.topic].name != DIAGNOSTICS:
-                continue
-            told: DiagnosticArray = deserialize_message(arrival.data, DiagnosticArray)
-            for status in (s for s in told.status if s.name == wanted):
-                cause = {v.key: v.value for v in status.values}.get('cause', '')
-                if cause:
-                    event.explain(cause)
-
-    def _end_event(self) -> None:
-        event, self._event = self._event, None
-        if event is None:
-            return
-        if event.session is None:
-            self._begin_event(event)
-            # It is begun to be ended at once, where the node ends.
-            self._event = None
-        if event.session is None:
-            return
-        report = event.close()
-        if report.full or not report.finished:
-            self._say_event_trouble(f'the bag of the {event.events[0]}: {report}')
-        else:
-            self.get_logger().info(str(report))
-
-    def _report_events(self) -> Report:
-        values: dict[str, object] = {
-            'kept [s]': self._recent.seconds,
-            'kept [MB]': self._recent.size / _MEGABYTE,
-            MARKS: self._marks,
-            LAST_EVENT: self._last_event,
-        }
-        if self._event_trouble:
-            return ERROR, self._event_trouble, values
-        if not self._keeps:
-            return OK, 'keeps nothing for bags of faults and marks', values
-        return OK, 'writing' if self._event else 'keeping the last seconds', values
+        self._events.go_on(arrivals)
 
     def _report(self) -> Report:
         if self._session is None:
