@@ -316,7 +316,7 @@ def is_wide(effect: NamedEffect) -> bool:
 
 
 def narrow(
-    recordings: Sequence[Recording],
+    recording: Recording,
     plant: PlantDescription,
     effect: NamedEffect,
     jobs: int = 1,
@@ -325,7 +325,7 @@ def narrow(
     """Propose the motion that narrows the interval of an effect's strength, which `plant` has.
 
     None where no safe motion, but those that were played, is expected to halve it. The precision is
-    what all recordings and the motion have of it together, by white noise (Box, Lucas, Biometrika
+    what the recording and the motion have of it together, by white noise (Box, Lucas, Biometrika
     46, 1959).
     """
     base, flags = packed_joint(plant, effect.joint)
@@ -342,20 +342,20 @@ def narrow(
         return np.asarray(slope.T @ slope)
 
     model = JointModel(
-        next(o for o in observe(recordings[0], plant) if o.joint == effect.joint), base, flags, free
+        next(o for o in observe(recording, plant) if o.joint == effect.joint), base, flags, free
     )
-    before = sum(map(precision, recordings), np.diag(model.prior_weight() ** 2))
+    before = precision(recording) + np.diag(model.prior_weight() ** 2)
 
     def deviation(known: Array) -> float:
         return float(np.sqrt(np.linalg.inv(known)[strength[0], strength[0]]))
 
     motions = [
         motion
-        for motion in safe_family(recordings[0], [plant], effect.joint)
+        for motion in safe_family(recording, [plant], effect.joint)
         if (motion.name, motion.joint) not in played
     ]
     after = parallel_map(
-        lambda m: deviation(before + precision(imagine(plant, m, recordings[0].rig))), motions, jobs
+        lambda m: deviation(before + precision(imagine(plant, m, recording.rig))), motions, jobs
     )
     shares = [each / deviation(before) for each in after]
     if not shares or min(shares) > HALVED:

@@ -84,6 +84,16 @@ class Series:
 
 
 @dataclass(frozen=True)
+class Restart:
+    """Where another recording of the same rig begins within one that was made of several."""
+
+    time: float  # of its first command, s
+    # (J, K), as `Recording.start`, the motors' way since the recording before.
+    way: Array
+    speed: Array  # (J,), as `Recording.start_speed`
+
+
+@dataclass(frozen=True)
 class Recording:
     """What was commanded and measured."""
 
@@ -104,6 +114,7 @@ class Recording:
     # recording began; the first command alone where None.
     start: Array | None = None
     start_speed: Array | None = None  # (J,), speed of each motor then, rad/s; they stood where None
+    restarts: tuple[Restart, ...] = ()  # of the recordings after the first one; see `takes`
     rig: Rig = field(default_factory=shipped_rig)  # gear, limits and time-outs of what was recorded
     rig_kind: RigKind = field(default_factory=RigKind)  # what the recording says that it is of
 

@@ -1,6 +1,6 @@
 """Which effects explain several recordings of one rig best together; see `search.levels`."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
@@ -16,7 +16,7 @@ from endoscope_explain.decide.given_physics import (
 from endoscope_explain.fit.nominal import ReferenceFits, with_references
 from endoscope_explain.fit.pooled import judged_alone
 from endoscope_explain.observe.observation import observe, with_held_noise
-from endoscope_explain.pipeline import Inputs, Sources, read_inputs, refuse_other_joints
+from endoscope_explain.pipeline import Sources, read_inputs, refuse_other_joints
 from endoscope_explain.search.levels import search
 
 
@@ -24,28 +24,22 @@ def physics_of_all(
     sources: Sequence[Sources], jobs: int, tell: Callable[[str], None]
 ) -> list[GivenJoints]:
     """Effects that explain all recordings of a rig; BagError if one cannot be used."""
-    return physics_of_inputs((read_inputs(one) for one in sources), jobs, tell)
-
-
-def physics_of_inputs(
-    inputs: Iterable[Inputs], jobs: int, tell: Callable[[str], None]
-) -> list[GivenJoints]:
-    """Effects that explain all recordings of a rig, which are read and audited."""
     recordings: list[dict[str, ReferenceFits]] = []
     most_effects, first_bag = 0, Path()
     with threadpool_limits(1, 'blas'):
-        for one in inputs:
-            sources, recording = one.sources, one.audit.recording
+        for of in sources:
+            one = read_inputs(of)
+            recording = one.audit.recording
             if recordings:
-                refuse_other_joints(sources.bag, recording.joints, first_bag, recordings[0])
+                refuse_other_joints(of.bag, recording.joints, first_bag, recordings[0])
             else:
-                most_effects, first_bag = sources.most_effects, sources.bag
+                most_effects, first_bag = of.most_effects, of.bag
             tell(f'{recording.name}: refitting the nominal plant')
             _, references = with_references(
                 recording,
                 with_held_noise(observe(recording, one.plant)),
                 one.plant,
-                sources.band,
+                of.band,
                 jobs,
             )
             recordings.append(dict(zip(recording.joints, references, strict=True)))

@@ -17,7 +17,6 @@ from endoscope_explain.investigation.investigation import (
     Investigation,
     NotPlayedError,
     RigStoppedError,
-    explain_inputs,
     investigate,
 )
 from endoscope_explain.investigation.log import LOG_JSON, LOG_MD, PLANT, Stop, begun
@@ -27,7 +26,8 @@ from endoscope_explain.investigation.motions import (
     commissioning,
     require_allowed,
 )
-from endoscope_explain.pipeline import Inputs, Sources
+from endoscope_explain.pipeline import Inputs, Sources, explain_case
+from endoscope_explain.takes import inputs_joined
 
 TO_ONE_SIDE = sequence(
     'to one side', [hold(1.0), move(0.0, 0.9, 2.0), hold(1.5, 0.9), move(0.9, 0.0, 2.0), hold(1.0)]
@@ -70,7 +70,7 @@ class SimulatedRig:
             )
             for bag in bags
         ]
-        return explain_inputs(inputs, 2)
+        return explain_case(inputs_joined(inputs))
 
 
 @pytest.fixture
@@ -121,14 +121,14 @@ def told(stribeck_case):
 
 
 def test_no_more_motions_are_asked_for_than_are_wanted(both, stribeck_case):
-    log = investigate(both, no_rig, lambda bags: [stribeck_case] * len(bags))
+    log = investigate(both, no_rig, lambda bags: stribeck_case)
     assert log.stopped is Stop.USED_UP
     assert log.rounds[0].motion == 'commissioning'
     assert len(log.rounds) == 2
     assert 'viscous_friction' in log.words
     # More of them continue it.
     again = investigate(
-        dataclasses.replace(both, experiments=2), no_rig, lambda bags: [stribeck_case] * len(bags)
+        dataclasses.replace(both, experiments=2), no_rig, lambda bags: stribeck_case
     )
     assert len(again.rounds) == 3
     motions = {(each.motion, each.joint) for each in again.rounds}
@@ -141,7 +141,7 @@ def test_a_fault_ends_it_with_what_is_known_and_it_is_continued(both, stribeck_c
             raise RigStoppedError('FAULT: wire_x_pos at 61 N')
         bag.mkdir()
 
-    log = investigate(both, breaks_down, lambda bags: [stribeck_case] * len(bags))
+    log = investigate(both, breaks_down, lambda bags: stribeck_case)
     assert log.stopped is Stop.FAULT
     assert 'wire_x_pos at 61 N' in log.words
     assert log.rounds[0].answer.names[0].id == 'stribeck_friction'
@@ -152,7 +152,7 @@ def test_a_fault_ends_it_with_what_is_known_and_it_is_continued(both, stribeck_c
 
     def explain(bags):
         explained.append([bag.name for bag in bags])
-        return [(told if len(bags) > 1 else stribeck_case) for _ in bags]
+        return told if len(bags) > 1 else stribeck_case
 
     again = investigate(both, no_rig, explain)
     # The recording that broke off is used no more, and its motion is asked for again.
@@ -167,7 +167,7 @@ def test_ctrl_c_loses_nothing(both, stribeck_case):
         bag.mkdir()
 
     with pytest.raises(KeyboardInterrupt):
-        investigate(both, interrupted, lambda bags: [stribeck_case] * len(bags))
+        investigate(both, interrupted, lambda bags: stribeck_case)
     kept = log_of(both.folder)
     assert kept['stopped'] == 'interrupted'
     assert kept['rounds'][0]['answer']['names'][0]['id'] == 'stribeck_friction'
@@ -178,13 +178,13 @@ def test_a_motion_that_nobody_wants_is_not_played(both, told):
     def declined(motion, file, bag):
         raise NotPlayedError('the operator answered no')
 
-    log = investigate(both, declined, lambda bags: [told])
+    log = investigate(both, declined, lambda bags: told)
     assert log.stopped is Stop.INTERRUPTED
     assert log.last_answer is None
 
 
 def test_what_is_at_its_end_is_not_begun_again(both, told):
-    assert investigate(both, no_rig, lambda bags: [told]).stopped is Stop.ONE_CLASS
+    assert investigate(both, no_rig, lambda bags: told).stopped is Stop.ONE_CLASS
     with pytest.raises(InputError, match='at its end: One class is left'):
         begun(both.folder, both.plant_file)
 
@@ -193,7 +193,7 @@ def test_another_plant_or_a_folder_of_something_else_is_refused(both, tmp_path, 
     with pytest.raises(InputError, match='holds no investigation'):
         begun(tmp_path, both.plant_file)
     dropped = dataclasses.replace(both, experiments=0)
-    investigate(dropped, no_rig, lambda bags: [stribeck_case])
+    investigate(dropped, no_rig, lambda bags: stribeck_case)
     save_plant(ONE, both.plant_file)
     with pytest.raises(InputError, match='another plant'):
         begun(both.folder, both.plant_file)

@@ -10,19 +10,18 @@ from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_core.physics.effect import NominalPhysics, Symptom
 from endoscope_core.physics.effects import CATALOGUE, describe, showing
 from endoscope_core.physics.functions.places import HIGH, LAG, NODES, VALUES
-from endoscope_core.physics.kernel import run_joints
 from endoscope_core.physics.layout import (
     FRICTION_PROFILE,
     NOMINAL_KEYS,
-    OUTPUTS,
     PROFILE_TERMS,
 )
-from endoscope_core.physics.packing import pack, rest_state
+from endoscope_core.physics.packing import pack
 from endoscope_core.physics.simulator import TICK
 from endoscope_explain.fit.family import Family
 from endoscope_explain.fit.free_parameters import COEFFICIENT, COORDINATE, LEAD, FreeParameter
 from endoscope_explain.fit.solver import STEP, Effort, Ended, Minimum, Renewal, minimise
 from endoscope_explain.observe.observation import JointObservation
+from endoscope_explain.observe.simulated import simulate_joints
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -35,13 +34,7 @@ def simulate_joint(
     inputs: Array | None = None,
 ) -> Array:
     """Noise-free readings (N, OUTPUTS) of one joint under the recorded, or other, inputs."""
-    inputs = observation.inputs if inputs is None else inputs
-    packed, on = parameters[None], flags[None]
-    speed = np.array([observation.start_speed])
-    start = rest_state(packed, on, observation.tick, observation.start[None], speed)
-    out = np.empty((1, inputs.shape[1], OUTPUTS))
-    run_joints(*start, packed, on, inputs, False, observation.tick, out)
-    return out[0]
+    return simulate_joints((observation,), parameters[None], flags[None], inputs)[0]
 
 
 def residuals(

@@ -26,17 +26,16 @@ from endoscope_explain.investigation.motions import (
     of_experiment,
     require_allowed,
 )
-from endoscope_explain.observe.predicted_signals import fits_by, view
-from endoscope_explain.pipeline import Inputs, Progress, Sources, explain_case, read_inputs
+from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
 from endoscope_explain.report.numbers import shown
 from endoscope_explain.report.sentences import verdict_sentence
-from endoscope_explain.shared_physics import physics_of_inputs
+from endoscope_explain.takes import inputs_joined
 
 EXPERIMENTS = 4
 
 Play = Callable[[Motion, Path, Path], None]
 """Plays a motion, which a file holds, and records it to a bag."""
-Explain = Callable[[Sequence[Path]], Sequence[ExplainedCase]]
+Explain = Callable[[Sequence[Path]], ExplainedCase]
 """Explains recordings of one rig together."""
 Page = Callable[[Log], str]
 
@@ -67,24 +66,11 @@ class Investigation:
 
 def explain_together(
     bags: Sequence[Path], investigation: Investigation, progress: Progress | None = None
-) -> list[ExplainedCase]:
-    """Explain bags of one rig, as `explain_inputs` does; BagError if one cannot be used."""
+) -> ExplainedCase:
+    """Explain bags of one rig as one recording; BagError if one cannot be used."""
     plant, file = investigation.plant, investigation.plant_file
     inputs = [read_inputs(Sources(bag, plant, quick=True, plant_file=file)) for bag in bags]
-    return explain_inputs(inputs, investigation.jobs, progress)
-
-
-def explain_inputs(
-    inputs: Sequence[Inputs], jobs: int, progress: Progress | None = None
-) -> list[ExplainedCase]:
-    """Explain recordings of one rig: one by itself, several by what all of them need."""
-    if len(inputs) > 1:
-        all_given = physics_of_inputs(inputs, jobs, progress or (lambda _: None))
-        inputs = [
-            replace(one, sources=replace(one.sources, given=given))
-            for one, given in zip(inputs, all_given, strict=True)
-        ]
-    return [explain_case(one, jobs=jobs, progress=progress) for one in inputs]
+    return explain_case(inputs_joined(inputs), jobs=investigation.jobs, progress=progress)
 
 
 def investigate(
@@ -162,23 +148,21 @@ class _Running:
         """Explain all recordings together, and say what to ask next, or why nothing."""
         began = time.monotonic()
         whole = self.log.whole
-        cases = explain([self.of.folder / each.bag for each in whole])
-        best = best_case(cases)
-        save_plant(best.plant, self.of.folder / logs.PLANT)
-        found = answer_of(cases, best, time.monotonic() - began)
+        case = explain([self.of.folder / each.bag for each in whole])
+        save_plant(case.plant, self.of.folder / logs.PLANT)
+        found = answer_of(case, time.monotonic() - began)
         last = whole[-1]
         rounds = (replace(r, answer=found) if r is last else r for r in self.log.rounds)
         self.keep(replace(self.log, rounds=tuple(rounds)))
         for line in logs.answered(found):
             self.say(line)
-        names = _names(cases)
-        if not _asks_more(names):
+        if not _asks_more(case.effects):
             return Stop.ONE_CLASS
         if len(whole) > self.of.experiments:
             return Stop.USED_UP
         self.say('looking for the motion that tells more')
         played = {(each.motion, each.joint) for each in whole}
-        proposed = _proposed(cases, best, names, self.of.jobs, played)
+        proposed = _proposed(case, self.of.jobs, played)
         return Stop.NOTHING_TO_GAIN if proposed is None else of_experiment(proposed)
 
     def why_enough(self, stop: Stop) -> str:
@@ -204,26 +188,15 @@ class _Running:
         self.say(sentence)
 
 
-def best_case(cases: Sequence[ExplainedCase]) -> ExplainedCase:
-    """The case whose improved plant leaves least of all recordings, by the worst signal."""
-
-    def left(case: ExplainedCase) -> float:
-        fits = [fits_by(view(c.recording, {'improved': case.plant}), 'improved') for c in cases]
-        return max(fit.ratio for each in fits for fit in each.values())
-
-    fitted = [case for case in cases if case.explanation.fit]
-    return min(fitted, key=left) if len(fitted) > 1 else (fitted or list(cases))[0]
-
-
-def answer_of(cases: Sequence[ExplainedCase], best: ExplainedCase, seconds: float) -> Answer:
+def answer_of(case: ExplainedCase, seconds: float) -> Answer:
     """What all recordings say together."""
-    fit = best.explanation.fit
+    fit = case.explanation.fit
     worst = [
         max((each.ratio for each in fit[name].values()), default=None) if name in fit else None
         for name in ('nominal', 'augmented')
     ]
-    names = tuple(Name(e.id, e.joint, e.alternatives, _strength(e)) for e in _names(cases))
-    return Answer(str(best.verdict), verdict_sentence(best), names, worst[0], worst[1], seconds)
+    names = tuple(Name(e.id, e.joint, e.alternatives, _strength(e)) for e in case.effects)
+    return Answer(str(case.verdict), verdict_sentence(case), names, worst[0], worst[1], seconds)
 
 
 def _strength(effect: NamedEffect) -> str:
@@ -231,46 +204,24 @@ def _strength(effect: NamedEffect) -> str:
     return str(shown(first, effect.parameters[first])) if first in effect.parameters else ''
 
 
-def _names(cases: Sequence[ExplainedCase]) -> list[NamedEffect]:
-    """Effects of all recordings, each once, as the recording has it that tells its size best."""
-    found: dict[tuple[str, str], NamedEffect] = {}
-    for effect in (each for case in cases for each in case.effects):
-        key = effect.id, effect.joint
-        if key not in found or _width(effect) < _width(found[key]):
-            found[key] = effect
-    return list(found.values())
-
-
-def _width(effect: NamedEffect) -> float:
-    first = effect.parameters.get(effect.definition.parameters[0].name)
-    return math.inf if first is None else first.high - first.low
-
-
 def _asks_more(names: Sequence[NamedEffect]) -> bool:
     return any(is_wide(e) or any(a in KNOWN for a in e.alternatives) for e in names)
 
 
 def _proposed(
-    cases: Sequence[ExplainedCase],
-    best: ExplainedCase,
-    names: Sequence[NamedEffect],
-    jobs: int,
-    played: set[tuple[str, str]],
+    case: ExplainedCase, jobs: int, played: set[tuple[str, str]]
 ) -> NextExperiment | None:
     """The motion that tells rivals apart, or that narrows a wide interval where none has any."""
-    recordings = [case.recording for case in cases]
-    longest = max(recordings, key=lambda one: one.command.time[-1] - one.command.time[0])
-    plant = best.explanation.augmented
+    recording, plant = case.recording, case.explanation.augmented
     there = {(spec.id, spec.joint) for spec in plant.effects}
-    known = [e for e in names if (e.id, e.joint) in there]
-    left = _left(best)
+    known = [e for e in case.effects if (e.id, e.joint) in there]
+    left = _left(case)
     for effect in known:
-        found = propose(longest, plant, effect, jobs, played, left)
+        found = propose(recording, plant, effect, jobs, played, left)
         if found is not None:
             return found
-    others = [longest, *(one for one in recordings if one is not longest)]
     for effect in filter(is_wide, known):
-        found = narrow(others, plant, effect, jobs, played)
+        found = narrow(recording, plant, effect, jobs, played)
         if found is not None:
             return found
     return None

@@ -136,6 +136,15 @@ class Channel:
 
 
 @dataclass(frozen=True)
+class JointRestart:
+    """A `Restart` of one joint."""
+
+    tick: int  # of its first command
+    way: Array  # (K,), rad
+    speed: float  # rad/s
+
+
+@dataclass(frozen=True)
 class JointObservation:
     """One joint's input and channels."""
 
@@ -147,6 +156,7 @@ class JointObservation:
     channels: tuple[Channel, ...]
     tick: float = TICK  # in s
     start_speed: float = 0.0  # of the motor at first, rad/s
+    restarts: tuple[JointRestart, ...] = ()
 
     @property
     def size(self) -> int:
@@ -172,7 +182,9 @@ class JointObservation:
         padded = np.concatenate([self.inputs, np.repeat(self.inputs[:, -1:], missing, axis=1)], 1)
         inputs = padded.reshape(1, ticks, factor, layout.INPUTS).mean(axis=2)
         channels = tuple(replace(c, stamps=c.stamps.coarser(factor)) for c in self.channels)
-        return replace(self, inputs=inputs, channels=channels, tick=factor * self.tick)
+        restarts = tuple(replace(each, tick=each.tick // factor) for each in self.restarts)
+        tick = factor * self.tick
+        return replace(self, inputs=inputs, channels=channels, tick=tick, restarts=restarts)
 
     def beside(self, other: Array) -> 'JointObservation':
         """The same readings with the other joint's bending angle (N,) in rad on ticks."""
@@ -201,7 +213,13 @@ def observe(recording: Recording, plant: PlantDescription) -> tuple[JointObserva
         channels = _channels(recording, j, joint, plant.sensors, begin, ticks)
         start = inputs[0, :1, layout.IN_COMMAND] if recording.start is None else recording.start[j]
         speed = 0.0 if recording.start_speed is None else float(recording.start_speed[j])
-        joints.append(JointObservation(joint, inputs, start, channels, start_speed=speed))
+        restarts = tuple(
+            JointRestart(round((r.time - begin) / TICK), r.way[j], float(r.speed[j]))
+            for r in recording.restarts
+        )
+        joints.append(
+            JointObservation(joint, inputs, start, channels, start_speed=speed, restarts=restarts)
+        )
     return tuple(joints)
 
 

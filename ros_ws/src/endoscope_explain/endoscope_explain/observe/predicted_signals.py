@@ -7,12 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
-from endoscope_core.physics.kernel import run_joints
-from endoscope_core.physics.layout import OUTPUTS
-from endoscope_core.physics.packing import pack, recording_faults, rest_state
-from endoscope_core.physics.simulator import TICK
+from endoscope_core.physics.packing import pack, recording_faults
 from endoscope_explain.explanation import ChannelFit
 from endoscope_explain.observe.observation import JointObservation, observe
+from endoscope_explain.observe.simulated import simulate_joints
 from endoscope_explain.recording import Recording
 
 Array = NDArray[np.float64]
@@ -68,14 +66,7 @@ def packed_rig(
 
 def simulate_rig(observations: tuple[JointObservation, ...], plant: PlantDescription) -> Array:
     """Simulate all joints of a recording, in the plant's order, side by side: (J, N, OUTPUTS)."""
-    parameters, flags = packed_rig(observations, plant)
-    inputs = np.concatenate([o.inputs for o in observations])
-    start = np.stack([o.start for o in observations])
-    speed = np.array([o.start_speed for o in observations])
-    begun = rest_state(parameters, flags, TICK, start, speed)
-    out = np.empty((len(observations), inputs.shape[1], OUTPUTS))
-    run_joints(*begun, parameters, flags, inputs, len(observations) > 1, TICK, out)
-    return out
+    return simulate_joints(observations, *packed_rig(observations, plant))
 
 
 def reading_lead(observations: tuple[JointObservation, ...], outputs: Array) -> float:

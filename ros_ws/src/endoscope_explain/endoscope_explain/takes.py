@@ -1,0 +1,101 @@
+"""Several recordings of one rig, made one after the other, as one recording.
+
+What a rig is like does not change from one motion to the next: one set of numbers has to explain
+all of them, and the search of one recording serves for several.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from endoscope_explain.audit.finding import AuditReport, Finding
+from endoscope_explain.pipeline import Inputs, refuse_other_joints
+from endoscope_explain.recording import Array, Recording, Restart, Series
+
+APART_S = 1.0
+"""Least rest between two recordings; each begins whole seconds after the first one, so that ticks
+of any length begin with it."""
+
+
+def inputs_joined(inputs: Sequence[Inputs]) -> Inputs:
+    """Recordings of one rig, read and audited, as one; BagError if one has other joints."""
+    first = inputs[0]
+    if len(inputs) == 1:
+        return first
+    recordings = [one.audit.recording for one in inputs]
+    for one, recording in zip(inputs, recordings, strict=True):
+        refuse_other_joints(
+            one.sources.bag, recording.joints, first.sources.bag, recordings[0].joints
+        )
+    later = _later_by(recordings)
+    findings = [
+        _of_a_take(finding, one.audit.recording.name, by)
+        for one, by in zip(inputs, later, strict=True)
+        for finding in one.audit.findings
+    ]
+    # What is wrong with several of them is one fault.
+    once = {(f.id, f.joint, f.signals): f for f in reversed(findings)}
+    kept = tuple(f for f in findings if once[f.id, f.joint, f.signals] is f)
+    return replace(first, audit=AuditReport(recordings_joined(recordings), kept))
+
+
+def recordings_joined(recordings: Sequence[Recording]) -> Recording:
+    """Recordings of the same joints one after the other, with the series that all of them have."""
+    first = recordings[0]
+    later = _later_by(recordings)
+    measured = [recording.measured() for recording in recordings]
+    series = {
+        name: _one_after_another([own[name] for own in measured], later)
+        if all(name in own for own in measured)
+        else None
+        for name in measured[0]
+    }
+    return replace(
+        first,
+        name=', '.join(recording.name for recording in recordings),
+        command=_one_after_another([recording.command for recording in recordings], later),
+        notes=tuple(dict.fromkeys(note for one in recordings for note in one.notes)),
+        restarts=tuple(
+            Restart(float(one.command.time[0]) + by, _way(one), _speed(one))
+            for one, by in zip(recordings[1:], later[1:], strict=True)
+        ),
+        **series,
+    )
+
+
+def _later_by(recordings: Sequence[Recording]) -> list[float]:
+    """By how much the times of each recording are later, in s, in all of them as one."""
+    begin, later = float(recordings[0].command.time[0]), [0.0]
+    for before, one in pairwise(recordings):
+        over = before.duration + later[-1] + APART_S
+        own = float(one.command.time[0])
+        # No sample of it may come before its own first command's whole second.
+        later.append(begin + math.ceil(over - begin + own) - own)
+    return later
+
+
+def _one_after_another(parts: Sequence[Series], later: Sequence[float]) -> Series:
+    return Series(
+        parts[0].topic,
+        np.concatenate([part.time + by for part, by in zip(parts, later, strict=True)]),
+        np.concatenate([part.values for part in parts]),
+        np.concatenate([part.valid for part in parts]),
+    )
+
+
+def _way(recording: Recording) -> Array:
+    return recording.command.values[0][:, None] if recording.start is None else recording.start
+
+
+def _speed(recording: Recording) -> Array:
+    if recording.start_speed is None:
+        return np.zeros(len(recording.joints))
+    return recording.start_speed
+
+
+def _of_a_take(finding: Finding, name: str, by: float) -> Finding:
+    intervals = tuple((begin + by, end + by) for begin, end in finding.intervals)
+    return replace(finding, text=f'{name}: {finding.text}', intervals=intervals)
