@@ -245,8 +245,11 @@ BENCHES: dict[str, Bench] = {
         (
             _seeds('of the changes (1-3)'),
             _seeds('of rigs that stay as they are (1-6)', '--nominal', last=6),
+            _only('change'),
             _option('--derive', 'derive the thresholds from these', action='store_true'),
             _file('--write', 'module for them'),
+            _file('--json', 'file for all rows; what is in it is not done again'),
+            _seconds(86400.0, 'take what there is after so long, in s', '--within'),
             _jobs(),
         ),
     ),

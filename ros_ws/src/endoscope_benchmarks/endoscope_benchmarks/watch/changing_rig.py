@@ -1,13 +1,15 @@
 """Rigs that become different while they move, and what a watch says of them."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from endoscope_benchmarks.concealed import motions, rigs
-from endoscope_core.monitoring import Alarm, Part, RigWatch
+from endoscope_core.monitoring import Part, RigWatch
 from endoscope_core.monitoring.criteria import THRESHOLDS
 from endoscope_core.monitoring.rig_watch import BLOCK_S
 from endoscope_core.physics import EffectSpec, PlantDescription, SensorModel, layout
@@ -65,29 +67,34 @@ class Watched:
     kind: str  # in `KINDS`, or empty for none
     seed: int
     changed_at: float
-    alarms: tuple[Alarm, ...]
+    told_at: float  # first alarm; NaN where nothing was told
+    part: str  # likeliest of that alarm, or empty
+    said: tuple[str, ...]
     largest: Mapping[str, float]  # largest gain of each part
 
     @property
     def early(self) -> bool:
         """Whether something was told before anything had changed."""
-        return any(not self.kind or alarm.at <= self.changed_at for alarm in self.alarms)
+        return bool(self.said) and not (self.kind and self.told_at > self.changed_at)
 
     @property
     def told(self) -> bool:
         """Whether the change was told in time."""
-        end = self.changed_at + TOLD_WITHIN_S
-        return not self.early and any(alarm.at <= end for alarm in self.alarms)
+        return not self.early and self.told_at <= self.changed_at + TOLD_WITHIN_S
 
     @property
     def right(self) -> bool:
         """Whether it was told of its part."""
-        first = min(self.alarms, key=lambda alarm: alarm.at, default=None)
-        return self.told and first is not None and first.parts[:1] == (KINDS[self.kind],)
+        return self.told and self.part == KINDS[self.kind]
 
 
-def watched(seed: int, kind: str, thresholds: Mapping[str, float] = THRESHOLDS) -> Watched:
-    """Move a drawn rig, change it if there is a kind, and watch it."""
+def watched(kind: str, seed: int, thresholds: Mapping[str, float] = THRESHOLDS) -> Watched:
+    """Move a drawn rig on one core, change it if there is a kind, and watch it."""
+    with threadpool_limits(1):
+        return _watched(kind, seed, thresholds)
+
+
+def _watched(kind: str, seed: int, thresholds: Mapping[str, float]) -> Watched:
     generator = np.random.default_rng([seed, [*KINDS, ''].index(kind)])
     described = rigs.described_rig(generator, 2)
     true = rigs.true_rig(generator, described)
@@ -114,7 +121,16 @@ def watched(seed: int, kind: str, thresholds: Mapping[str, float] = THRESHOLDS) 
         watch.update(float(time[-1]))
         for part, gain in watch.gains().items():
             largest[part] = max(largest[part], gain)
-    return Watched(kind, seed, at, tuple(watch.alarms), largest)
+    alarms = sorted(watch.alarms, key=lambda alarm: alarm.at)
+    return Watched(
+        kind,
+        seed,
+        at,
+        alarms[0].at if alarms else math.nan,
+        str(next(iter(alarms[0].parts), '')) if alarms else '',
+        tuple(f'{alarm.at - at:+.1f} s {alarm}' for alarm in alarms),
+        largest,
+    )
 
 
 class _ChangingRig:

@@ -2,17 +2,26 @@
 
 import argparse
 import math
+import time
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from scipy.stats import gumbel_r
 
-from endoscope_benchmarks.bench import table_head, table_row
+from endoscope_benchmarks.bench import (
+    chosen,
+    keep_row,
+    kept_rows,
+    report,
+    side_by_side,
+    table_head,
+    table_row,
+)
 from endoscope_benchmarks.watch.changing_rig import KINDS, SEGMENT_S, Watched, watched
 from endoscope_core.atomic_output import write_text
 from endoscope_core.monitoring import Part
 from endoscope_core.monitoring.criteria import THRESHOLDS
-from endoscope_core.workers import worker_pool
 
 _PER_HOUR = 0.1
 """False alarms in an hour of motion that the thresholds are derived for, all parts together."""
@@ -23,20 +32,38 @@ def run(args: argparse.Namespace) -> int:
     """Print a table, or the thresholds; return 0."""
     # Nothing is told where thresholds are derived, so that each rig is judged to its end.
     thresholds = dict.fromkeys(map(str, Part), math.inf) if args.derive else THRESHOLDS
-    kinds = () if args.derive else tuple(KINDS)
-    cases = [(seed, kind) for kind in kinds for seed in args.seeds]
-    cases += [(seed, '') for seed in args.nominal]
-    calls = [(*case, thresholds) for case in cases]
-    with worker_pool(args.jobs) as pool:
-        rows = list(pool.map(watched, *zip(*calls, strict=True)))
+    kinds = () if args.derive else tuple(chosen('change', args.only, KINDS))
+    rows = {(row.kind, row.seed): row for row in _kept(args.json)}
+    cases = _in_turn([(kind, seed) for seed in args.seeds for kind in kinds], args.nominal)
+    calls = [(*case, thresholds) for case in cases if case not in rows]
+    ends = time.monotonic() + args.within
+    for (kind, seed, _), future in side_by_side(args.jobs, watched, calls):
+        rows[kind, seed] = future.result()
+        if args.json:
+            keep_row(args.json, rows[kind, seed])
+        if time.monotonic() > ends:
+            report(f'ended after {args.within:g} s with {len(rows)} of {len(cases)} rigs')
+            break
+    done = [rows[case] for case in sorted(cases, key=lambda case: case[1]) if case in rows]
     if args.derive:
-        source = derived(rows)
+        source = derived(done)
         print(source)
         if args.write:
             write_text(args.write, source)
     else:
-        _print(rows)
+        _print(done, kinds)
     return 0
+
+
+def _kept(file: Path | None) -> list[Watched]:
+    return kept_rows(file, Watched) if file is not None and file.exists() else []
+
+
+def _in_turn(changes: Sequence[tuple[str, int]], nominal: Sequence[int]) -> list[tuple[str, int]]:
+    """Cases of both sorts in proportion, so that a run that is ended early has its share."""
+    places = [(k / len(changes), case) for k, case in enumerate(changes)]
+    places += [(k / len(nominal), ('', seed)) for k, seed in enumerate(nominal)]
+    return [case for _, case in sorted(places, key=lambda each: each[0])]
 
 
 def derived(rows: Sequence[Watched]) -> str:
@@ -67,9 +94,9 @@ def derived(rows: Sequence[Watched]) -> str:
     )
 
 
-def _print(rows: Sequence[Watched]) -> None:
+def _print(rows: Sequence[Watched], kinds: Sequence[str]) -> None:
     print(table_head('change', 'rigs', 'told within 10 s', 'right stage', 'told before it'))
-    for kind in (*KINDS, 'all'):
+    for kind in (*kinds, 'all'):
         of = [row for row in rows if row.kind and kind in (row.kind, 'all')]
         counts = [sum(getattr(row, name) for row in of) for name in ('told', 'right', 'early')]
         print(table_row(kind, len(of), *counts))
@@ -78,5 +105,5 @@ def _print(rows: Sequence[Watched]) -> None:
     print(f'false alarms: {false} in {len(nominal) * _HOURS:.1f} h of nominal motion')
     for row in rows:
         if row.early or (row.kind and not row.right):
-            said = [f'{alarm.at - row.changed_at:+.1f} s {alarm}' for alarm in row.alarms]
-            print(f'{row.kind or "nominal"}, seed {row.seed}: {"; ".join(said) or "nothing told"}')
+            said = '; '.join(row.said) or 'nothing told'
+            print(f'{row.kind or "nominal"}, seed {row.seed}: {said}')

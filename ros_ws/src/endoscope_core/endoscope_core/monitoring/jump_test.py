@@ -11,6 +11,7 @@ Changes, 1993, ch. 2 and 7. Noise is of unknown size near the one learnt (Studen
 motion which the description predicts badly is not taken for a change.
 """
 
+import math
 from collections import deque
 from dataclasses import dataclass
 from typing import Self
@@ -52,6 +53,19 @@ class Block:
             np.sum(r * r, axis=1),
             known.sum(axis=0).astype(np.float64),
         )
+
+    def flat(self) -> Array:
+        """All of it in one row, which adds up over blocks."""
+        return np.concatenate([np.ravel(each) for each in vars(self).values()])
+
+    @staticmethod
+    def split(rows: Array, channels: int, directions: int) -> tuple[Array, Array, Array, Array]:
+        """Parts of rows (N, ...) that `flat` has made, each (N, ...)."""
+        shapes = [(channels, directions, directions), (channels, directions), *[(channels,)] * 2]
+        ends = np.cumsum([math.prod(shape) for shape in shapes])
+        parts = np.split(rows, ends[:-1], axis=1)
+        a, b, c, d = (x.reshape(-1, *shape) for x, shape in zip(parts, shapes, strict=True))
+        return a, b, c, d
 
     def left(self, estimate: Array) -> Array:
         """Sum of squares (C,) that an estimate (D,) of the difference leaves."""
@@ -108,12 +122,15 @@ class JumpTest:
     ) -> None:
         self._along, self._one_way, self._least = along, one_way, least
         self._windows = windows
+        self._shape = len(noise), len(tolerance)
         self._estimate = np.zeros(len(tolerance))
         self._covariance = np.diag(tolerance**2)
         self._walk = np.diag(drift**2)
         self._square = GUESSED * noise**2
         self._blocks = np.full(len(noise), GUESSED)
         self._recent: deque[Block] = deque()
+        # Sums over all blocks until each of the recent ones.
+        self._sums: deque[Array] = deque([np.zeros(1)], int(windows[-1]) + 1)
         self.learnt = 0  # blocks that have entered the estimate
         self.learning = True
 
@@ -125,10 +142,13 @@ class JumpTest:
     def interrupt(self) -> None:
         """Forget the blocks that have not entered the estimate."""
         self._recent.clear()
+        self._sums.clear()
+        self._sums.append(np.zeros(1))
 
     def add(self, block: Block) -> Jumps | None:
         """Judge a block and those before; None until there are as many as the longest window."""
         self._recent.append(block)
+        self._sums.append(self._sums[-1] + block.flat())
         if len(self._recent) <= self._windows[-1]:
             return None
         oldest = self._recent.popleft()
@@ -159,15 +179,12 @@ class JumpTest:
 
     def _judged(self) -> Jumps:
         w, along = self._weights(), self._along.T
-        newest_first = list(reversed(self._recent))
-
-        def of_windows(each: list[Array]) -> Array:
-            return np.asarray(np.cumsum(each, axis=0)[self._windows - 1])
-
-        by_channel = of_windows([w[:, None, None] * b.information for b in newest_first])
-        score = of_windows([w[:, None] * b.score for b in newest_first])
-        square = of_windows([w * b.square for b in newest_first])
-        count = of_windows([b.count for b in newest_first]) / TOGETHER
+        now = self._sums[-1]
+        by_channel, score, square, count = Block.split(
+            np.stack([now - self._sums[-1 - length] for length in self._windows]), *self._shape
+        )
+        by_channel = w[:, None, None] * by_channel
+        score, square, count = w[:, None] * score, w * square, count / TOGETHER
         information = by_channel.sum(axis=1)
         # Score z and information M of a jump where b is known become (1 + M P)^-1 times those where
         # it is as uncertain as the estimate.
