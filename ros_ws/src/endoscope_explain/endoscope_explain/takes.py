@@ -47,13 +47,8 @@ def recordings_joined(recordings: Sequence[Recording]) -> Recording:
     first = recordings[0]
     later = _later_by(recordings)
     measured = [recording.measured() for recording in recordings]
-    series = {
-        name: _one_after_another([own[name] for own in measured], later)
-        if all(name in own for own in measured)
-        else None
-        for name in measured[0]
-    }
-    return replace(
+    everywhere = [name for name in measured[0] if all(name in own for own in measured)]
+    whole = replace(
         first,
         name=', '.join(recording.name for recording in recordings),
         command=_one_after_another([recording.command for recording in recordings], later),
@@ -62,7 +57,13 @@ def recordings_joined(recordings: Sequence[Recording]) -> Recording:
             Restart(float(one.command.time[0]) + by, _way(one), _speed(one))
             for one, by in zip(recordings[1:], later[1:], strict=True)
         ),
-        **series,
+        tension=None,
+        shaft_position=None,
+        shaft_velocity=None,
+        shaft_effort=None,
+    )
+    return whole.with_series(
+        {name: _one_after_another([own[name] for own in measured], later) for name in everywhere}
     )
 
 
