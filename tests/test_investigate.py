@@ -9,14 +9,14 @@ import pytest
 from endoscope_bags import open_bag
 from endoscope_bringup import cli
 from endoscope_bringup.demo.live_graph import NODES, LiveGraph
-from endoscope_bringup.operating.motion_player import MotionPlayer
+from endoscope_core.errors import NotPlayedError, RigStoppedError
 from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import hold, move, sequence
 from endoscope_core.signals.command_file import JOINTS, CommandTable, write_command_file
-from endoscope_explain.investigation.investigation import NotPlayedError, RigStoppedError
 from endoscope_explain.investigation.motions import Motion
 from endoscope_nodes.client.graph_parameters import read_parameter
+from endoscope_nodes.client.motion_player import MotionPlayer
 from endoscope_nodes.names import SLAVE_COMMAND
 from endoscope_nodes.nodes.recorder import RecorderNode
 

@@ -9,8 +9,10 @@ import numpy as np
 
 from endoscope_bags.errors import BagError, BagNotFoundError
 from endoscope_bags.event_bag import Event, events_of
+from endoscope_bags.mcap_summary import McapSummary, read_summary
 from endoscope_bags.metadata import bag_files
 from endoscope_bags.recording import open_bag
+from endoscope_bags.sqlite3_scan import is_sqlite3
 from endoscope_core.errors import EndoscopeError, printable
 
 RECORDING = 'recording'
@@ -27,7 +29,7 @@ class BagEntry:
     duration_s: float
     size: int  # bytes
     events: tuple[Event, ...]  # why it was kept
-    trouble: str  # why it cannot be read, or what is damaged; else empty
+    trouble: str  # why it cannot be read, or that it was cut off; else empty
 
     def as_json(self) -> dict[str, Any]:
         """Return it as plain data."""
@@ -45,7 +47,9 @@ class BagEntry:
 def bags_in(folder: Path) -> list[BagEntry]:
     """Look into all recordings of a folder, oldest first.
 
-    BagNotFoundError if there is no such folder; a recording that cannot be read is listed with why.
+    Of a recording that was finished the summary is read, and what is damaged before it is not
+    noticed. BagNotFoundError if there is no such folder; a recording that cannot be read is listed
+    with why.
     """
     if not folder.is_dir():
         raise BagNotFoundError(f'{folder}: no such folder')
@@ -64,25 +68,48 @@ def _is_bag(path: Path) -> bool:
 def _entry(path: Path) -> BagEntry:
     trouble = ''
     try:
-        size = sum(file.stat().st_size for file in bag_files(path))
-        try:
-            recording = open_bag(path)
-        except BagError as error:
-            # A recorder that was killed has left a reason, and what came before it.
-            trouble = str(error)
-            recording = open_bag(path, salvage=True)
+        files = bag_files(path)
+        size = sum(file.stat().st_size for file in files)
+        told = _summary(files)
+        if told is None:
+            told, trouble = _read_whole(path)
     except (EndoscopeError, OSError) as error:
         return BagEntry(path.name, RECORDING, 0, 0.0, 0, (), str(error))
-    events = tuple(events_of(recording.metadata))
+    events = tuple(events_of(told.metadata))
     return BagEntry(
         path.name,
         events[0].kind if events else RECORDING,
-        recording.start_ns,
-        (recording.end_ns - recording.start_ns) * 1e-9,
+        told.start_ns,
+        (told.end_ns - told.start_ns) * 1e-9,
         size,
         events,
         trouble,
     )
+
+
+def _summary(files: Sequence[Path]) -> McapSummary | None:
+    """What the summaries of all files say together; None where one has none."""
+    told = [None if is_sqlite3(file) else read_summary(file) for file in files]
+    found = [each for each in told if each is not None]
+    if len(found) < len(files):
+        return None
+    return McapSummary(
+        min(each.start_ns for each in found),
+        max(each.end_ns for each in found),
+        {name: content for each in found for name, content in each.metadata.items()},
+    )
+
+
+def _read_whole(path: Path) -> tuple[McapSummary, str]:
+    """The same of a recording without a summary, and what is wrong with it."""
+    trouble = ''
+    try:
+        recording = open_bag(path)
+    except BagError as error:
+        # A recorder that was killed has left a reason, and what came before it.
+        trouble = str(error)
+        recording = open_bag(path, salvage=True)
+    return McapSummary(recording.start_ns, recording.end_ns, recording.metadata), trouble
 
 
 def listing(folder: Path, entries: Sequence[BagEntry]) -> str:

@@ -34,6 +34,14 @@ class OutputError(EndoscopeError, OSError):
     """Nothing can be written where an output should go to, or the place is taken."""
 
 
+class RigStoppedError(EndoscopeError):
+    """The rig stopped by itself; the message says why."""
+
+
+class NotPlayedError(EndoscopeError):
+    """A person did not want a motion, or ended it."""
+
+
 def nearest(name: str, valid: Iterable[str]) -> str:
     """A hint that names the valid name nearest to a wrong one, and else all of them."""
     valid = list(valid)

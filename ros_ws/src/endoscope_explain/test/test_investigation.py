@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from endoscope_core.errors import InputError
+from endoscope_core.errors import InputError, NotPlayedError, RigStoppedError
 from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
 from endoscope_core.physics.plant_file import load_plant, save_plant
 from endoscope_core.rig import shipped_rig
@@ -15,8 +15,6 @@ from endoscope_core.signals.command_file import JOINTS, CommandTable, read_comma
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.investigation.investigation import (
     Investigation,
-    NotPlayedError,
-    RigStoppedError,
     investigate,
 )
 from endoscope_explain.investigation.log import LOG_JSON, LOG_MD, PLANT, Stop, begun

@@ -76,7 +76,6 @@ def run(args: argparse.Namespace) -> int:
     from functools import partial
 
     from endoscope_bringup.operating.actions import paused_when_interrupted
-    from endoscope_bringup.operating.motion_player import MotionPlayer
     from endoscope_core.errors import EndoscopeError
     from endoscope_core.rig import load_rig
     from endoscope_explain.investigation import page
@@ -86,6 +85,7 @@ def run(args: argparse.Namespace) -> int:
         investigate,
     )
     from endoscope_explain.investigation.log import PAGE, Stop, begun
+    from endoscope_nodes.client.motion_player import MotionPlayer
 
     if not (args.attended or sys.stdin.isatty()):
         raise EndoscopeError('nobody can be asked for each motion here: give --attended, or a tty')

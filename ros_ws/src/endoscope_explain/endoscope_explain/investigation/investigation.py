@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from endoscope_core.atomic_output import write_text
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import NotPlayedError, RigStoppedError
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.effects import KNOWN
 from endoscope_core.physics.plant_file import load_plant, save_plant
@@ -38,14 +38,6 @@ Play = Callable[[Motion, Path, Path], None]
 Explain = Callable[[Sequence[Path]], ExplainedCase]
 """Explains recordings of one rig together."""
 Page = Callable[[Log], str]
-
-
-class RigStoppedError(EndoscopeError):
-    """The rig stopped by itself; the message says why."""
-
-
-class NotPlayedError(EndoscopeError):
-    """A person did not want a motion, or ended it."""
 
 
 @dataclass(frozen=True)

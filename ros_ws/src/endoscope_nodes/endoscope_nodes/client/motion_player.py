@@ -1,13 +1,12 @@
 """Plays a motion on a running graph, with the operator's consent, and records it."""
 
+import math
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
-from endoscope_core.errors import OutputError
-from endoscope_explain.investigation.investigation import NotPlayedError, RigStoppedError
-from endoscope_explain.investigation.motions import Motion
+from endoscope_core.errors import NotPlayedError, OutputError, RigStoppedError
 from endoscope_nodes import names
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import MASTER, RECORDER, GraphError
@@ -26,18 +25,42 @@ Consent = Callable[[str], bool]
 """Asks a person, in words, whether something may be done."""
 
 
+class PlayedMotion(Protocol):
+    """A motion as its player knows it."""
+
+    @property
+    def words(self) -> str:
+        """As a person is asked for it."""
+        ...
+
+    @property
+    def duration(self) -> float:
+        """In s."""
+        ...
+
+
 class MotionPlayer:
     """Plays motions one at a time, each in a motion session of its own.
 
     A session is opened for a motion that somebody consents to, and ends with it. Whatever ends a
-    motion before its end pauses the graph.
+    motion before its end pauses the graph. With `hold_to_play` a person enables the slave, and the
+    motion goes on only while the clutch is held. What is `withdrawn` after consent is not played.
     """
 
-    def __init__(self, client: GraphClient, consent: Consent) -> None:
+    def __init__(
+        self,
+        client: GraphClient,
+        consent: Consent,
+        *,
+        hold_to_play: bool = False,
+        withdrawn: Callable[[], bool] = lambda: False,
+    ) -> None:
         self._client = client
         self._consent = consent
+        self._hold_to_play = hold_to_play
+        self._withdrawn = withdrawn
 
-    def play(self, motion: Motion, file: Path, bag: Path) -> None:
+    def play(self, motion: PlayedMotion, file: Path, bag: Path) -> None:
         """Play a motion, which a file holds, and record it to a bag that does not exist.
 
         RigStoppedError if the rig stops on the way, NotPlayedError if nobody consents or a person
@@ -50,8 +73,11 @@ class MotionPlayer:
         self._look()
         with ExitStack() as after:
             self._as_commanded(after)
-            self._recording(bag, after)
             try:
+                if self._hold_to_play:
+                    # Nobody knows how long that takes: it is no part of the recording.
+                    self._until_enabled()
+                self._recording(bag, after)
                 if client.state != 'ENABLED':
                     client.ask_and_see('enable', PATIENCE_S)
                 self._played(motion, file)
@@ -76,7 +102,7 @@ class MotionPlayer:
 
     def _as_commanded(self, after: ExitStack) -> None:
         """Let nothing add to the motion, until `after`."""
-        silent: dict[str, Any] = {'source': 'none', 'hold_to_play': False, 'command_file': ''}
+        silent = {'source': 'none', 'hold_to_play': self._hold_to_play, 'command_file': ''}
         for node, values in (*AS_COMMANDED, (names.MASTER_NODE, silent)):
             before = {
                 name: read_parameter(self._client, f'{node}.{name}', PATIENCE_S).value
@@ -86,7 +112,15 @@ class MotionPlayer:
             if node == names.MASTER_NODE and before['source'] in ('motion', 'file'):
                 before['source'] = 'none'
             after.callback(set_parameters, self._client, node, before)
-            set_parameters(self._client, node, {k: v for k, v in values.items() if v != ''})
+            given: dict[str, Any] = {k: v for k, v in values.items() if v != ''}
+            set_parameters(self._client, node, given)
+
+    def _until_enabled(self) -> None:
+        client = self._client
+        client.wait_until(
+            lambda: client.state in ('ENABLED', 'FAULT') or self._withdrawn(), math.inf
+        )
+        self._require_enabled()
 
     def _recording(self, bag: Path, after: ExitStack) -> None:
         """Record to a bag, until `after`."""
@@ -101,21 +135,23 @@ class MotionPlayer:
         client.trigger(names.RECORDER_START, PATIENCE_S)
         after.callback(client.trigger, names.RECORDER_STOP, PATIENCE_S)
 
-    def _played(self, motion: Motion, file: Path) -> None:
+    def _played(self, motion: PlayedMotion, file: Path) -> None:
         client = self._client
         path = str(file.absolute())
         set_parameters(client, names.MASTER_NODE, {'command_file': path, 'source': 'file'})
         asked_ns = client.graph_ns
-        left = NEXT_WORD_S
 
         def is_at_its_end() -> bool:
             said = client.health.get(MASTER)
             heard = said is not None and said.values[names.FINISHED] == 'True'
-            return heard and client.graph_ns > asked_ns + round(left * 1e9)
+            return heard and client.graph_ns > asked_ns + round(NEXT_WORD_S * 1e9)
 
-        patience_s = motion.duration + PATIENCE_S
-        client.wait_until(lambda: client.state != 'ENABLED' or is_at_its_end(), patience_s)
-        if client.state == 'ENABLED' and not is_at_its_end():
+        patience_s = math.inf if self._hold_to_play else motion.duration + PATIENCE_S
+        client.wait_until(
+            lambda: client.state != 'ENABLED' or is_at_its_end() or self._withdrawn(), patience_s
+        )
+        self._require_enabled()
+        if not is_at_its_end():
             raise GraphError(f'the console did not play {file} to its end in {patience_s:.0f} s')
         client.wait_until(lambda: client.state != 'ENABLED', REST_S)
         self._require_enabled()
@@ -126,5 +162,7 @@ class MotionPlayer:
         if client.state == 'FAULT':
             client.wait_until(lambda: bool(client.why), NEXT_WORD_S)
             raise RigStoppedError(f'FAULT: {client.why or "its cause is not known"}')
+        if self._withdrawn():
+            raise NotPlayedError('a person ended it')
         if client.state != 'ENABLED':
             raise NotPlayedError(f'the slave is {client.state}: {client.why or "asked for"}')
