@@ -56,6 +56,11 @@ def _seconds(default: float, what: str, name: str = '--seconds') -> Option:
     return _option(name, f'{what} (default: {default:g})', type=kind, default=default)
 
 
+def _minutes(name: str, what: str, default: float) -> Option:
+    kind = within(0.0, 1e5, float)
+    return _option(name, f'{what} ({default:g})', type=kind, default=default, metavar='M')
+
+
 def _only(what: str) -> Option:
     return _option('--only', f'{what}s to try (default: all)', nargs='+', metavar=what.upper())
 
@@ -189,6 +194,23 @@ BENCHES: dict[str, Bench] = {
             _file(
                 '--against', 'rows of an earlier run: explain the same cases, and say what differs'
             ),
+        ),
+    ),
+    'investigate': Bench(
+        'investigate',
+        'ask concealed rigs for motions until they are explained',
+        'Draws rigs with something concealed, of the kernel and of a simulator that shares nothing '
+        'with it, every fourth with two effects. Each is explained by the commissioning motion, by '
+        'the loop of `endoscope investigate`, and by one fixed motion as long as all of the loop '
+        'together. Prints a line for each rig and way, and a table. Seeds from 1 to 99 are for '
+        'development; of others, first runs are reported. With --json each rig is kept once it is '
+        'known, and what the file has is not done again. Exits 1 if a rig could not be explained.',
+        (
+            _seeds('of the rigs (default: 1-4)', last=4),
+            _jobs(),
+            _file('--json', 'file for all rows'),
+            _minutes('--minutes', 'after which no rig is begun, and no motion played', 1440.0),
+            _minutes('--rig-minutes', 'after which no further motion of a rig is played', 60.0),
         ),
     ),
     'criteria': Bench(

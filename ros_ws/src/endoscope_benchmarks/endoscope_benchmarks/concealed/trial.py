@@ -137,7 +137,11 @@ def explanation_of(case: Case) -> tuple[Explanation, float]:
 
 def row_of(case: Case) -> Row:
     """Explain a case on one core, and judge what is said."""
-    said, seconds = explanation_of(case)
+    return judged_row(case, *explanation_of(case))
+
+
+def judged_row(case: Case, said: Explanation, seconds: float) -> Row:
+    """Judge what is said of a case after some seconds."""
     names = statements(said)
     errors = [_error(*number) for number in _numbers(case, said)]
     judgement = judged(case.laws, names, case.also)
