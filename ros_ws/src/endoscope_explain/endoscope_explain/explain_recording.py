@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.layout import IN_OTHER_JOINT
@@ -37,8 +38,10 @@ from endoscope_explain.fit.nominal import (
 from endoscope_explain.observe.observation import JointObservation, observe, with_held_noise
 from endoscope_explain.recording import LEAST_DURATION_S, MOVES_RAD, Recording
 from endoscope_explain.search.levels import MOST_EFFECTS, JointSearch, search
+from endoscope_explain.search.other_joint import stands_beside
 from endoscope_explain.search.refit import Candidate
 
+Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 SAME_RIG = 0.03
@@ -81,7 +84,10 @@ def explain_recording(
         tried = search([pair], jobs, most_effects, left_out)
         return tried, decide(tried, jobs)
 
-    searches, decisions = _explained_together(references, explained, jobs, tell)
+    def stands(tried: JointSearch, angle: Array) -> bool:
+        return given is None and stands_beside(tried, angle, left_out, jobs)
+
+    searches, decisions = _explained_together(references, explained, stands, jobs, tell)
     tell('judging on held-out blocks')
     effects = named(observations, decisions)
     of_joint = {o.joint: d for o, d in zip(observations, decisions, strict=True)}
@@ -139,6 +145,7 @@ def _healthy(
 def _explained_together(
     references: list[ReferenceFits],
     explained: Callable[[ReferenceFits], Explained],
+    stands: Callable[[JointSearch, Array], bool],
     jobs: int,
     tell: Progress,
 ) -> tuple[list[JointSearch], list[Decision]]:
@@ -157,9 +164,11 @@ def _explained_together(
         off = float(np.sqrt(np.mean((angle - seen[index]) ** 2)))
         if (not own.chosen.terms and own.adequate) or off <= _noise_of(observations[1 - index]):
             continue
+        seen[index] = angle
+        if stands(found[index][0], angle):
+            continue
         joint = observations[index].joint
         tell(f'searching what is missing from {joint} beside the other one as found')
-        seen[index] = angle
         found[index] = explained(beside(references[index], of_other.chosen.fit))
     return [tried for tried, _ in found], [decision for _, decision in found]
 

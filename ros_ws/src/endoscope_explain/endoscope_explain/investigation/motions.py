@@ -9,8 +9,14 @@ from numpy.typing import NDArray
 from endoscope_core.errors import InputError
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.rig import Rig
+from endoscope_core.signals import Signal, hold, sequence
 from endoscope_core.signals.command_file import JOINTS, CommandTable
-from endoscope_core.signals.motions import commissioning_motion
+from endoscope_core.signals.motions import (
+    chirp,
+    steps_with_holds,
+    teleoperation_like,
+    triangle,
+)
 from endoscope_explain.case import NextExperiment
 from endoscope_explain.design import SAMPLE_S, answer_to, as_played, is_safe
 from endoscope_explain.investigation.log import COMMISSIONING, in_words
@@ -52,16 +58,41 @@ class Motion:
         return in_words(self.waveform, self.joint, self.duration, math.degrees(self.largest))
 
 
+def first_motion() -> dict[str, Signal]:
+    """A slow triangle, steps with rests, free reaches and a chirp, by joint: 25 s.
+
+    Half as long as the motion of `signals.commissioning_motion`, as what it leaves open is asked
+    for by the next one. `bend_y` begins once `bend_x` has moved alone, so that whatever appears on
+    it meanwhile is coupling.
+    """
+    x, y = (_pieces(math.radians(size), k) for k, size in enumerate((70.0, 60.0)))
+    waits = hold(x[0].duration)
+    return {
+        'bend_x': sequence(COMMISSIONING, x),
+        'bend_y': sequence(COMMISSIONING, [waits, y[2], y[0], y[3], y[1]]),
+    }
+
+
+def _pieces(reach: float, seed: int) -> list[Signal]:
+    levels = tuple(reach * share for share in (0.5, 1.0, -0.2, -0.9, 0.3))
+    return [
+        triangle(reach, 0.8 * reach),
+        steps_with_holds(levels, 0.2),
+        teleoperation_like(seed, 6, reach),
+        chirp(0.8 * reach, 6.0, 0.3),
+    ]
+
+
 def commissioning(plant: PlantDescription, rig: Rig) -> Motion:
     """The commissioning motion as large as the rig's limits and the described plant allow.
 
     MotionRefusedError if the described plant answers it beyond them at any size.
     """
-    motion = commissioning_motion()
-    time = np.arange(0.0, motion.duration, SAMPLE_S)
+    motion = first_motion()
+    time = np.arange(0.0, max(signal.duration for signal in motion.values()), SAMPLE_S)
     whole = np.stack(
         [
-            motion.joints[joint](time)[0] if joint in plant.joints else np.zeros_like(time)
+            motion[joint](time)[0] if joint in plant.joints else np.zeros_like(time)
             for joint in JOINTS
         ],
         axis=1,

@@ -69,9 +69,7 @@ def screen_terms(parent: Parent, jobs: int, left_out: tuple[str, ...]) -> Screen
 def _terms(behind: Sequence[Background], left_out: tuple[str, ...]) -> list[tuple[Term, ...]]:
     """What may be missing from the joint, of each recording."""
     if len(behind) == 1:
-        (only,) = behind
-        left = only.left(only.fit.residuals * only.weight)
-        return [(*effects(only.fit, left_out), *functions(only.fit, left))]
+        return [addable(behind[0], left_out)]
     # What was fitted to one motion is not told from time by another.
     found = [
         [
@@ -83,6 +81,12 @@ def _terms(behind: Sequence[Background], left_out: tuple[str, ...]) -> list[tupl
     ]
     everywhere = set.intersection(*({term.id for term in terms} for terms in found))
     return [tuple(term for term in terms if term.id in everywhere) for terms in found]
+
+
+def addable(behind: Background, left_out: tuple[str, ...]) -> tuple[Term, ...]:
+    """What may be missing from the joint of one recording."""
+    left = behind.left(behind.fit.residuals * behind.weight)
+    return (*effects(behind.fit, left_out), *functions(behind.fit, left))
 
 
 def expanded(screen: Screened, jobs: int) -> list[Candidate]:
