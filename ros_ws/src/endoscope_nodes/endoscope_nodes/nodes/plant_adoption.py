@@ -190,8 +190,11 @@ class PlantAdoption:
         answer: str,
         code: AdoptionCode = AdoptionCode.NONE,
     ) -> None:
-        log = self._node.get_logger()
-        (log.warning if code else log.info)(answer)
+        # A place in the code that logs has one severity for ever.
+        if code:
+            self._node.get_logger().warning(answer)
+        else:
+            self._node.get_logger().info(answer)
         self._told = PlantInForce(id=request.id, state=state, code=code, answer=answer)
         self._publish()
 
