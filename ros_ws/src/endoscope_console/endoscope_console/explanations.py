@@ -1,14 +1,9 @@
 """Explanations of recordings on this machine, each in a process of its own that gives way."""
 
-import asyncio
 import json
-import os
 import secrets
-import signal
-import sys
 import time
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +13,7 @@ import yaml
 from endoscope_bags.errors import BagError
 from endoscope_bags.metadata import bag_files
 from endoscope_console.access import REPORTS
+from endoscope_console.background import Background
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import PlantDescription
 from endoscope_core.physics.plant_file import save_plant
@@ -31,9 +27,9 @@ _STEPS = 7
 """That `endoscope explain` names on the way, for two joints."""
 _TOLD = 20
 _REMARKS = ('note:', 'audit:')
-_NICE = 10
-_ENDED_S = 5.0
 _METADATA = 'metadata.yaml'
+PLANT_FILE = 'plant.yaml'
+"""The improved plant of an explanation."""
 
 
 @dataclass
@@ -52,6 +48,7 @@ class Explanation:
     experiment: bool = False  # there is a motion that would tell more
     plant: str = ''  # by which it is explained
     report: str | None = None  # path of its address; None where there is none
+    improved: str = ''  # name of the improved plant; empty where there is none
 
     def ended(self, sentence: str = '') -> None:
         """Take what was found from its folder, in words where the program has said none."""
@@ -68,6 +65,8 @@ class Explanation:
         self.experiment = planned and (self.folder / EXPERIMENT_FILE).is_file()
         if (self.folder / REPORT_FILE).is_file():
             self.report = f'{REPORTS}{self.secret}/{REPORT_FILE}'
+        if (self.folder / PLANT_FILE).is_file():
+            self.improved = f'{self.folder.name}/{PLANT_FILE}'
 
     def as_mapping(self) -> dict[str, Any]:
         """What a page is told of it."""
@@ -82,21 +81,20 @@ class Explanation:
             'report': self.report,
             'error': self.error or None,
             'experiment': self.experiment,
+            'improved': self.improved,
         }
 
 
 class Explanations:
     """Recordings of one folder, and what explains them."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self, folder: Path, background: Background) -> None:
+        self._folder, self._background = folder, background
         self._all: dict[str, Explanation] = {}
         # Those that are there can be read again.
         found = sorted(folder.glob(f'*/{_RESULT_FILE}'), key=lambda file: file.stat().st_mtime)
         for file in found:
             self._new(file.parent.name, file.parent).ended()
-        self._process: asyncio.subprocess.Process | None = None
-        self._task: asyncio.Task[None] | None = None
 
     def as_list(self) -> list[dict[str, Any]]:
         """What a page is told of the last twenty, newest first."""
@@ -121,10 +119,10 @@ class Explanations:
     def _plants(self) -> dict[str, Path]:
         found = {path.name: path for path in self._folder.glob('*.yaml')}
         # Others are added while a thread of the pool lists these.
-        for one in tuple(self._all.values()):
-            improved = one.folder / 'plant.yaml'
-            if not one.running and improved.is_file():
-                found[f'{one.folder.name}/plant.yaml'] = improved
+        unfinished = {one.folder for one in tuple(self._all.values()) if one.running}
+        for improved in self._folder.glob(f'*/{PLANT_FILE}'):
+            if improved.parent not in unfinished:
+                found[f'{improved.parent.name}/{PLANT_FILE}'] = improved
         return found
 
     def file_of(self, secret: str) -> Path | None:
@@ -150,26 +148,32 @@ class Explanations:
         own: str = '',
     ) -> Mapping[str, Any]:
         """Begin to explain a recording by a plant, the graph's own where none is named."""
-        bags, plants = self._bags(), self._plants()
-        for kind, name, known in (
-            *(('recording', name, bags) for name in (bag, baseline, validate)),
-            ('plant', plant, plants),
-        ):
-            if name is not None and name not in known:
-                raise EndoscopeError(f'there is no {kind} {name} in {self._folder}')
-        file = plants[plant] if plant is not None else self._own_plant(own)
-        if self._task is not None and not self._task.done():
-            raise EndoscopeError('another recording is being explained')
+        bags = self._bags()
+        for name in (bag, baseline, validate):
+            if name is not None and name not in bags:
+                raise EndoscopeError(f'there is no recording {name} in {self._folder}')
+        file = self.plant_file(plant, own)
+        self._background.require_free()
         name = f'why-{bag.removesuffix(".mcap")}-{time.strftime("%Y%m%d-%H%M%S")}'
         one = self._new(bag, self._folder / name)
         one.plant = plant or own
         words = [str(bags[bag]), '--out', str(one.folder), '--jobs', '1']
         for option, chosen in (('--baseline', baseline), ('--validate', validate)):
             words += [option, str(bags[chosen])] if chosen is not None else []
-        self._task = asyncio.get_running_loop().create_task(
-            self._explain(one, [*words, '--plant', str(file)])
+        self._background.start(
+            'another recording is being explained',
+            self._explain(one, ['explain', *words, '--plant', str(file)]),
         )
         return {'explanation': one.id}
+
+    def plant_file(self, plant: str | None, own: str = '') -> Path:
+        """File of a plant that `listing` names, or of the graph's own where none is named."""
+        if plant is None:
+            return self._own_plant(own)
+        plants = self._plants()
+        if plant not in plants:
+            raise EndoscopeError(f'there is no plant {plant} in {self._folder}')
+        return plants[plant]
 
     def _own_plant(self, own: str) -> Path:
         """File of the graph's own plant; the nominal one is written beside the recordings."""
@@ -187,46 +191,26 @@ class Explanations:
         return one
 
     async def _explain(self, one: Explanation, words: list[str]) -> None:
+        said: list[str] = []
+        done = 0
+
+        def take_step(line: str) -> None:
+            """Take a step that it names; the last line of one that fails says why."""
+            nonlocal done
+            text = line.strip()
+            if text and not text.startswith(_REMARKS):
+                done += 1
+                one.step, one.progress = text, min(done / _STEPS, 0.95)
+
         try:
-            status, said = await self._run(one, words)
+            status = await self._background.run(words, said.append, take_step)
         except (OSError, ValueError) as error:
             one.running, one.error = False, f'it could not be followed: {error}'
             return
         if status:
             one.running, one.error = False, one.error or one.step
         else:
-            one.ended(said.decode(errors='replace').partition('\n')[0])
-
-    async def _run(self, one: Explanation, words: list[str]) -> tuple[int, bytes]:
-        """Run the program to its end, which comes at once where it cannot be followed."""
-        self._process = await asyncio.create_subprocess_exec(
-            *(sys.executable, '-m', 'endoscope_bringup.cli', 'explain', *words),
-            stdin=asyncio.subprocess.DEVNULL,
-            stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.PIPE,
-            start_new_session=True,
-        )
-        with suppress(ProcessLookupError):
-            os.setpriority(os.PRIO_PROCESS, self._process.pid, _NICE)
-        try:
-            said, _ = await asyncio.gather(
-                self._process.stdout.read(),  # type: ignore[union-attr]
-                self._follow(one, self._process.stderr),  # type: ignore[arg-type]
-            )
-        except BaseException:
-            with suppress(ProcessLookupError):
-                os.killpg(self._process.pid, signal.SIGKILL)
-            raise
-        return await self._process.wait(), said
-
-    async def _follow(self, one: Explanation, lines: asyncio.StreamReader) -> None:
-        """Take the steps that it names; the last line of one that fails says why."""
-        done = 0
-        while line := await lines.readline():
-            text = line.decode(errors='replace').strip()
-            if text and not text.startswith(_REMARKS):
-                done += 1
-                one.step, one.progress = text, min(done / _STEPS, 0.95)
+            one.ended(said[0] if said else '')
 
     async def cancel(self, name: str) -> str:
         """End one that is under way."""
@@ -234,19 +218,8 @@ class Explanations:
         if one is None or not one.running:
             raise EndoscopeError(f'no explanation {name} is under way')
         one.error = 'cancelled'
-        await self.close()
+        await self._background.close()
         return ''
-
-    async def close(self) -> None:
-        """End what is under way, with all that it started."""
-        if self._task is None or self._task.done():
-            return
-        if self._process is not None and self._process.returncode is None:
-            os.killpg(self._process.pid, signal.SIGTERM)
-        _, late = await asyncio.wait({self._task}, timeout=_ENDED_S)
-        if late and self._process is not None:
-            os.killpg(self._process.pid, signal.SIGKILL)
-            await self._task
 
 
 def _in_short(result: Mapping[str, Any]) -> str:

@@ -25,6 +25,7 @@ from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import MASTER, GraphError, Health
 from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
 from endoscope_nodes.client.handle_sender import handle_senders
+from endoscope_nodes.client.plant_adoption import AdoptedPlants
 from endoscope_nodes.names import CONSOLE_LOG, FINISHED
 from endoscope_nodes.runtime.diagnostics import OK, WARN, status
 from endoscope_nodes.runtime.environment import joined_node
@@ -77,6 +78,7 @@ class GraphSide:
     def __init__(self, client: _Client, pictures: Pictures, services: threading.Thread) -> None:
         self._services = services
         self.client = client
+        self.plants = AdoptedPlants(client)
         self.pictures = pictures
         # Of the master; asked for each second, and by whoever changed them.
         self.settings = Settings()
@@ -130,13 +132,14 @@ class GraphSide:
     def plant(self) -> str:
         """File of the plant that the graph simulates; a name of the shipped one, or empty."""
         try:
-            file, rig = (
-                read_parameter(self.client, f'motor_driver.{name}', _LISTED_S).value
-                for name in ('plant_file', 'rig_file')
-            )
-            return str(file or load_rig(rig or None).simulation.plant or NOMINAL)
+            file = read_parameter(self.client, 'motor_driver.plant_file', _LISTED_S).value
+            return str(file or load_rig(self.rig_file() or None).simulation.plant or NOMINAL)
         except EndoscopeError:
             return ''
+
+    def rig_file(self) -> str:
+        """File of the rig that the graph has; empty for the one that is shipped."""
+        return str(read_parameter(self.client, 'motor_driver.rig_file', _LISTED_S).value)
 
     def compensate(self, mode: str) -> None:
         """Set the compensator's mode; the physical ones know the tube itself where it was found."""

@@ -7,6 +7,7 @@ from collections.abc import Callable, Coroutine, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from endoscope_console import orders
@@ -17,22 +18,19 @@ from endoscope_console.clients import Client, Clients
 from endoscope_console.explanations import Explanations
 from endoscope_console.graph_side import PATIENCE_S, GraphSide, Settings, identified
 from endoscope_console.handle_place import HandlePlace
+from endoscope_console.investigations import AskedMotion, Investigations
+from endoscope_console.investigations import Consent as AskOperator
+from endoscope_console.playing import Holder, Playing
 from endoscope_console.teleop.frames import InputFrame
 from endoscope_console.teleop.lease import Lease
 from endoscope_console.teleop.operator import DeadManState, Reason
-from endoscope_core.choices import (
-    FOLLOW_THE_HANDLE,
-    PHYSICAL,
-)
-from endoscope_core.errors import EndoscopeError
-from endoscope_nodes.client.graph_listener import MASTER, GraphError
-from endoscope_nodes.names import FINISHED, RECORDER_START, RECORDER_STOP
+from endoscope_core.choices import PHYSICAL
+from endoscope_core.errors import EndoscopeError, NotPlayedError
+from endoscope_nodes.client.plant_adoption import RefusedAdoptionError, plant_text
+from endoscope_nodes.names import RECORDER_START, RECORDER_STOP
 from endoscope_nodes.runtime.node_parameters import CompensatorParameters
 
 _WAITING_ORDERS = 16
-# The master tells once a second how far it is; a word from before it was asked means nothing.
-_NEXT_WORD_NS = 1_500_000_000
-_EXPERIMENT = 'an experiment'
 _NO_LEASE = (
     orders.Claim,
     orders.Release,
@@ -41,24 +39,9 @@ _NO_LEASE = (
     orders.Cancel,
     orders.Acknowledge,
 )
-
-
-@dataclass
-class _Holder:
-    """What the holder of the lease has begun, and whether its end is still waited for."""
-
-    client: Client | None = None
-    moves: str = ''
-    waits: bool = False
-
-
-@dataclass
-class _Played:
-    """An experiment that the master plays while the operator holds on."""
-
-    begun_ns: int
-    before: Mapping[str, Any]  # what the master was set to for a file of its own
-    ends: bool = False
+_WHERE_NOBODY_OPERATES = (orders.Record, orders.Mark, orders.Stop)
+_NOT_MEANWHILE = (orders.Set, orders.Record, orders.Adopt)
+"""While a motion of an investigation is recorded as it is commanded."""
 
 
 @dataclass
@@ -69,6 +52,7 @@ class Operations:
     beat: Beat
     clients: Clients
     explanations: Explanations
+    investigations: Investigations
     alarms: Alarms
     counts: Counter[str]  # of refusals
     lease: Lease = field(default_factory=Lease)  # of the one operator
@@ -76,9 +60,10 @@ class Operations:
     def __post_init__(self) -> None:
         self._pool = ThreadPoolExecutor(_WAITING_ORDERS, thread_name_prefix='order')
         self._place = HandlePlace(self.graph, self.beat, self._ask)
-        self._played: _Played | None = None
-        self._holder = _Holder()
+        self.playing = Playing(self.graph, self._place, self._ask, self.soon)
+        self._holder = Holder()
         self._halts = 0
+        self._consented: Client | None = None
         self._closing = False
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -116,17 +101,9 @@ class Operations:
             self._lease_ended(self._holder.client, why)
         if self._holder.moves and not self._holder.waits and self.graph.client.underway is None:
             self._holder.moves = ''
-        played = self._played
-        if played is not None and not played.ends and self._is_over(played):
-            played.ends = True
-            self.soon(self._end_of_play())
+        if self.playing.is_over():
+            self.soon(self.playing.end(self._holder))
         self._tell_beat()
-
-    def _is_over(self, played: _Played) -> bool:
-        """Whether the master has said, since it was asked to play, that it is at the end."""
-        said = self.graph.client.health.get(MASTER)
-        heard = said is not None and said.values[FINISHED] == 'True'
-        return heard and time.monotonic_ns() - played.begun_ns > _NEXT_WORD_NS
 
     def _tell_beat(self) -> None:
         graph, pictures = self.graph, self.graph.pictures
@@ -138,7 +115,7 @@ class Operations:
             calibrating=graph.client.underway is not None,
             source=graph.settings.source if self._place.speaks else '',
             pictures=pictures.made,
-            playing=self._played is not None,
+            playing=self.playing.underway,
             session=graph.client.session,
             wanted=pictures.wanted,
             wanted_ns=pictures.wanted_ns,
@@ -158,6 +135,8 @@ class Operations:
             ok = True
         except EndoscopeError as error:
             why, ok = str(error), False
+            if isinstance(error, RefusedAdoptionError):
+                answer = {'code': error.code}
             self.counts['refused: orders'] += 1
         # A viewer could fill the recording with what is refused anyhow.
         if client.role == OPERATOR and not isinstance(order, orders.Bags):
@@ -167,10 +146,12 @@ class Operations:
     def _check(self, client: Client, order: orders.Order) -> None:
         if client.role != OPERATOR:
             raise EndoscopeError('a viewer only looks on')
+        if self.playing.investigates and isinstance(order, _NOT_MEANWHILE):
+            raise EndoscopeError('a motion of an investigation is under way')
         if isinstance(order, _NO_LEASE) or client.id == self.lease.holder:
             return
         holder = self.holder
-        if isinstance(order, orders.Record) and not self.lease.holder:
+        if isinstance(order, _WHERE_NOBODY_OPERATES) and not self.lease.holder:
             return
         who = 'nobody operates: take the controls first'
         raise EndoscopeError(f'{holder.label} operates' if holder else who)
@@ -192,6 +173,9 @@ class Operations:
             case orders.Record():
                 service = RECORDER_START if order.on else RECORDER_STOP
                 return await self._ask(partial(self.graph.client.trigger, service, PATIENCE_S))
+            case orders.Mark():
+                bag = await self._ask(partial(self.graph.client.mark, order.reason, PATIENCE_S))
+                return f'kept as {Path(bag).name}'
             case orders.Acknowledge():
                 self.alarms.acknowledge(order.alarm)
                 return ''
@@ -207,6 +191,16 @@ class Operations:
                 return await self.explanations.cancel(order.explanation)
             case orders.Play():
                 return await self._play(client, order.explanation)
+            case orders.Adopt():
+                return await self._adopt(order.plant)
+            case orders.Investigate():
+                return await self._investigate(order)
+            case orders.Consent():
+                # Another hand is no hand for it.
+                self._consented = client
+                return self.investigations.answer(order.question, order.go)
+            case orders.Stop():
+                return await self.investigations.stop(order.investigation, self._halt)
 
     async def _ask[T](self, ask: Callable[[], T]) -> T:
         """Wait for the graph in a thread of the pool: the sockets go on meanwhile."""
@@ -216,13 +210,15 @@ class Operations:
         """Make a client the operator; what became of it."""
         if self._closing:
             raise EndoscopeError('the server of the page ends')
+        if self._holds(client) and self._place.speaks:
+            return ''
         claim = self.lease.claim(client.id, take, time.monotonic_ns())
         if not claim.granted:
             raise EndoscopeError(claim.why)
         if claim.lost_by:
             self._lost(claim.lost_by, client)
         if self._holder.client is not client:
-            self._holder = _Holder(client)
+            self._holder = Holder(client)
         self._tell_beat()
         async with self._place.lock:
             try:
@@ -231,7 +227,7 @@ class Operations:
             except BaseException:
                 if self.lease.holder == client.id:
                     self.lease.release(client.id)
-                    self._holder = _Holder()
+                    self._holder = Holder()
                     self._tell_beat()
                 raise
             if self.lease.holder != client.id:
@@ -256,7 +252,7 @@ class Operations:
 
     def _lease_ended(self, client: Client, why: str) -> None:
         self._end_what_moves(client.id)
-        self._holder = _Holder()
+        self._holder = Holder()
         self._tell_beat()
         self.graph.log('lease', client.id, client.address, True, f'ended: {why}')
         self.soon(self._give_back())
@@ -268,9 +264,9 @@ class Operations:
         self.beat.refuse(holder, Reason.LOST, time.monotonic_ns())
         if self._holder.moves:
             self.graph.client.order('pause')
-        if self._played is not None:
+        if self.playing.is_experiment:
             # The next operator's hand is no hand for what this one had played.
-            self.soon(self._end_of_play())
+            self.soon(self.playing.end(self._holder))
 
     def soon(self, work: Coroutine[Any, Any, None]) -> None:
         """Let something be done beside all else, whose end is waited for at the end."""
@@ -285,6 +281,7 @@ class Operations:
                 return
             self._place.speaks = False
             self._tell_beat()
+            await self._ask(self.graph.plants.leave)
             await self._place.give_back()
 
     async def _state(self, command: str) -> str:
@@ -294,6 +291,8 @@ class Operations:
             self._halts += 1
             graph.order(command)
             return await self._ask(partial(graph.ask, command, PATIENCE_S))
+        if self.playing.prepares:
+            raise EndoscopeError('the motion is being prepared: in a moment')
         withdrawn = self._withdrawn()
         if command == 'home':
             return await self._moving(command, partial(graph.home, PATIENCE_S, withdrawn))
@@ -341,40 +340,52 @@ class Operations:
             raise EndoscopeError(f'{self._holder.moves} is under way')
         if self.graph.client.state != 'ENABLED':
             raise EndoscopeError(f'the slave is {self.graph.client.state}: enable it first')
-        values = {'command_file': str(file), 'hold_to_play': True, 'source': 'file'}
-        async with self._place.lock:
-            changed = 'command_file', 'hold_to_play'
-            before = await self._ask(partial(self._place.read_master, *changed))
-            if self.lease.holder != client.id or self._holder.moves:
-                raise EndoscopeError('the controls were lost or taken to something else')
-            # Said before it is so: whoever loses the controls meanwhile leaves nothing behind.
-            holder = self._holder
-            holder.moves, holder.waits = _EXPERIMENT, True
-            played = self._played = _Played(time.monotonic_ns(), before)
-            try:
-                await self._ask(partial(self._place.set_master, **values))
-            except BaseException:
-                # It may have been set all the same, and only not answered.
-                self.soon(self._end_of_play())
-                raise
-            self.graph.settings = Settings('file', self.graph.settings.scale)
-            played.begun_ns = time.monotonic_ns()
-        return 'it plays while the dead-man is held; give the controls back to leave it'
+        still = partial(self._holds, client)
+        return await self.playing.begin(self._holder, still, file)
 
-    async def _end_of_play(self) -> None:
-        """Have the master follow the handle again."""
-        async with self._place.lock:
-            if self._played is None:
-                return
-            before, self._played = dict(self._played.before), None
-            if self._holder.moves == _EXPERIMENT:
-                self._holder.moves = ''
-            try:
-                before = before | {'source': FOLLOW_THE_HANDLE}
-                await self._ask(partial(self._place.set_master, **before))
-            except GraphError as error:
-                self.graph.log(f'console.source {FOLLOW_THE_HANDLE}', '', '', False, str(error))
-            self.graph.ask_for_settings(time.monotonic_ns())
+    def _holds(self, client: Client) -> bool:
+        return self.lease.holder == client.id
+
+    async def _adopt(self, plant: str | None) -> str:
+        """Put a plant into force, or the one before; what became of it."""
+        self._require_rest()
+        text = '' if plant is None else plant_text(self.explanations.plant_file(plant))
+        adopt = partial(self.graph.plants.adopt, text, PATIENCE_S)
+        return (await self._ask(adopt)).answer
+
+    def _require_rest(self) -> None:
+        if self._holder.moves:
+            raise EndoscopeError(f'{self._holder.moves} is under way')
+        if self.beat.said.state is DeadManState.ENGAGED:
+            raise EndoscopeError('let go first')
+
+    async def _investigate(self, order: orders.Investigate) -> Mapping[str, Any]:
+        """Begin an investigation, which moves nothing before it has asked."""
+        rig = await self._ask(self.graph.rig_file)
+        play = self._play_asked
+        if order.investigation is not None:
+            one = self.investigations.resume(order.investigation, rig, order.experiments, play)
+        else:
+            own = '' if order.plant else await self._ask(self.graph.plant)
+            one = self.investigations.begin(order.plant, own, rig, order.experiments, play)
+        return {'investigation': one}
+
+    async def _play_asked(self, motion: AskedMotion, ask: AskOperator) -> None:
+        """Have a motion played under the hand of whoever consents to it."""
+
+        def begins() -> tuple[Holder, Callable[[], bool]]:
+            if self._consented is not self.holder or not self._place.speaks:
+                raise NotPlayedError('whoever consented has lost the controls')
+            self._require_rest()
+            return self._holder, self._withdrawn()
+
+        await self.playing.motion(motion, ask, begins)
+
+    def _halt(self) -> None:
+        """End what an investigation moves."""
+        self._halts += 1
+        if self.graph.client.state == 'ENABLED':
+            self.graph.client.order('pause')
 
     async def _set(self, order: orders.Set) -> str:
         if order.scale is not None:
@@ -393,6 +404,7 @@ class Operations:
         if holder is not None:
             self.lease.release(holder.id)
             self._lease_ended(holder, 'the server of the page ends')
+        await self.investigations.close()
         while self._tasks:
             await asyncio.wait(set(self._tasks))
         self.graph.client.ends.set()

@@ -67,6 +67,12 @@ class Record(_Order, tag='record', frozen=True):
     on: bool
 
 
+class Mark(_Order, tag='mark', frozen=True):
+    """Keep what happened: the recorder's last seconds, and why."""
+
+    reason: Annotated[str, msgspec.Meta(max_length=1000)] = ''
+
+
 class Acknowledge(_Order, tag='acknowledge', frozen=True):
     """Take note of an alarm whose cause has gone."""
 
@@ -98,6 +104,33 @@ class Play(_Order, tag='play', frozen=True):
     explanation: _Name
 
 
+class Adopt(_Order, tag='adopt', frozen=True):
+    """Put a plant that `bags` lists into force, or without one the plant before."""
+
+    plant: _Name | None = None
+
+
+class Investigate(_Order, tag='investigate', frozen=True):
+    """Investigate the rig by a plant, or continue an investigation that was interrupted."""
+
+    experiments: Annotated[int, msgspec.Meta(ge=0, le=100)]
+    plant: _Name | None = None
+    investigation: _Name | None = None
+
+
+class Consent(_Order, tag='consent', frozen=True):
+    """Answer whether a motion that an investigation asks for may be made."""
+
+    question: _Name
+    go: bool
+
+
+class Stop(_Order, tag='stop', frozen=True):
+    """End an investigation, and pause what it moves."""
+
+    investigation: _Name
+
+
 Order = (
     Claim
     | Release
@@ -105,11 +138,16 @@ Order = (
     | Calibrate
     | Set
     | Record
+    | Mark
     | Acknowledge
     | Bags
     | Explain
     | Cancel
     | Play
+    | Adopt
+    | Investigate
+    | Consent
+    | Stop
 )
 """Any of them."""
 

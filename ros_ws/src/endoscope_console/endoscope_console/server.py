@@ -76,7 +76,8 @@ class Console:
         ]
 
     async def _report(self, request: Request) -> Response:
-        file = self.operations.explanations.file_of(request.path_params['secret'])
+        secret, operations = request.path_params['secret'], self.operations
+        file = operations.explanations.file_of(secret) or operations.investigations.file_of(secret)
         if file is None:
             return PlainTextResponse('there is no such report\n', 404)
         return FileResponse(file, media_type='text/html')

@@ -23,11 +23,13 @@ import yaml
 
 from endoscope_console.access import Admission, Tokens
 from endoscope_console.alarms import Alarms
+from endoscope_console.background import Background
 from endoscope_console.beat import Beat
 from endoscope_console.clients import Clients
 from endoscope_console.connections import limited
 from endoscope_console.explanations import Explanations
 from endoscope_console.graph_side import GraphSide, graph_side
+from endoscope_console.investigations import Investigations
 from endoscope_console.joy import JoyHand
 from endoscope_console.operations import Operations
 from endoscope_console.orders import LARGEST_BYTES
@@ -154,10 +156,14 @@ async def _serve(
 ) -> None:
     counts: Counter[str] = Counter()
     clients = Clients(counts)
-    explanations = Explanations(args.bags)
+    background = Background()
+    explanations = Explanations(args.bags, background)
+    investigations = Investigations(args.bags, explanations, background)
     limits = (rig.joints.hand_speed,) * len(JOINTS)
     with Beat(graph.client.node, PadHandle(len(JOINTS), mapping.speeds, limits)) as beat:
-        operations = Operations(graph, beat, clients, explanations, Alarms(), counts)
+        operations = Operations(
+            graph, beat, clients, explanations, investigations, Alarms(), counts
+        )
         view = View(operations, rig, counts)
         joy = JoyHand(graph, operations, mapping)
         console = Console(
@@ -183,7 +189,7 @@ async def _serve(
             await _until_one_ends({answering, *others})
         finally:
             await operations.close()
-            await explanations.close()
+            await background.close()
             server.should_exit = True
             await asyncio.wait({answering})
             for task in others:

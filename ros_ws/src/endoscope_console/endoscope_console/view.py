@@ -21,6 +21,7 @@ from endoscope_nodes.client.graph_listener import (
     SUPERVISOR,
     Health,
 )
+from endoscope_nodes.client.plant_adoption import PlantInForce
 from endoscope_nodes.names import WIRES
 
 _LEVELS = ('ok', 'warning', 'error', 'stale')
@@ -121,11 +122,15 @@ class View:
                 'result': _result(client.calibration),
             },
             'compensator': _compensator(client.compensator),
+            'adopted': _adopted(self._graph.plants.in_force),
             'recorder': _recorder(client.health.get(RECORDER)),
             'console': {'source': settings.source, 'scale': settings.scale},
             'playing': self._playing(),
+            'prepares': operations.playing.prepares,
+            'investigates': operations.playing.investigates,
             'alarms': alarms,
             'explanations': operations.explanations.as_list(),
+            'investigations': operations.investigations.as_list(),
         }
 
     def _time(self) -> str:
@@ -255,6 +260,13 @@ def _compensator(said: Health | None) -> dict[str, Any]:
     values = {} if said is None else said.values
     mode = values.get('mode', '')
     return {'mode': mode, 'wanted': values.get('wanted_mode', mode)}
+
+
+def _adopted(told: PlantInForce | None) -> dict[str, Any] | None:
+    """Which adopted plant is in force, in words; None before that is told."""
+    if told is None:
+        return None
+    return {'hash': told.hash, 'words': told.words, 'undo': bool(told.hash)}
 
 
 def _recorder(said: Health | None) -> dict[str, Any]:

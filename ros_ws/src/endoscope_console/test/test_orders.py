@@ -7,9 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from endoscope_console.orders import (
+    Adopt,
     Claim,
+    Consent,
     Explain,
+    Investigate,
     MalformedOrderError,
+    Mark,
     Set,
     State,
     in_words,
@@ -24,6 +28,10 @@ def test_orders_are_read():
     assert read_order('{"op":"state","id":3,"command":"home"}') == State(3, 'home')
     assert read_order('{"op":"set","id":4,"scale":0.5}') == Set(4, scale=0.5)
     assert read_order('{"op":"explain","id":5,"bag":"b","plant":null}') == Explain(5, 'b')
+    assert read_order('{"op":"mark","id":6}') == Mark(6, reason='')
+    assert read_order('{"op":"adopt","id":7,"plant":null}') == Adopt(7)
+    assert read_order('{"op":"investigate","id":8,"experiments":0}') == Investigate(8, 0)
+    assert read_order('{"op":"consent","id":9,"question":"q1","go":true}') == Consent(9, 'q1', True)
     assert read_hello('{"op":"hello","token":"x"}').token == 'x'
 
 
@@ -49,6 +57,8 @@ def test_orders_are_read():
         '{"op":"set","id":1,"compensator":"magic"}',
         '{"op":"record","id":1,"on":"yes"}',
         '{"op":"explain","id":1,"bag":""}',
+        '{"op":"investigate","id":1,"experiments":-1}',
+        '{"op":"consent","id":1,"question":"q1","go":"yes"}',
         '{"op":"claim","id":1' + '[' * 4000,
     ],
 )

@@ -1,7 +1,7 @@
 """`endoscope investigate`: a rig moves, is explained, and is asked what tells the rest apart."""
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -54,6 +54,12 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'for one by one',
     )
     parser.add_argument(
+        '--lines',
+        action='store_true',
+        help='another program plays: a line of JSON on the output asks for each motion, and one on '
+        'the input says what became of it, as endoscope console does',
+    )
+    parser.add_argument(
         '--simulate',
         type=Path,
         metavar='SLAVE.yaml',
@@ -76,32 +82,43 @@ def run(args: argparse.Namespace) -> int:
     from functools import partial
 
     from endoscope_bringup.operating.actions import paused_when_interrupted
+    from endoscope_bringup.operating.motions_by_lines import MotionsByLines
     from endoscope_core.errors import EndoscopeError
     from endoscope_core.rig import load_rig
     from endoscope_explain.investigation import page
     from endoscope_explain.investigation.investigation import (
         Investigation,
+        Play,
         explain_together,
         investigate,
     )
-    from endoscope_explain.investigation.log import PAGE, Stop, begun
+    from endoscope_explain.investigation.log import PAGE, Log, Stop, begun
     from endoscope_nodes.client.motion_player import MotionPlayer
 
-    if not (args.attended or sys.stdin.isatty()):
+    if not (args.attended or args.lines or sys.stdin.isatty()):
         raise EndoscopeError('nobody can be asked for each motion here: give --attended, or a tty')
     rig = load_rig(args.rig)
     of = Investigation(args.out, args.plant, rig, args.experiments, args.jobs)
     begun(of.folder, of.plant_file)
-    say = partial(print, flush=True)
-    consent = (lambda words: True) if args.attended else _asked
-    with _graph(args, rig) as client, paused_when_interrupted(client, moving=True):
-        log = investigate(
+    step = partial(print, file=sys.stderr, flush=True)
+
+    def investigated(play: Play, say: Callable[[str], None]) -> Log:
+        return investigate(
             of,
-            MotionPlayer(client, consent).play,
-            lambda bags: explain_together(bags, of, partial(print, file=sys.stderr, flush=True)),
+            play,
+            lambda bags: explain_together(bags, of, step),
             page=lambda log: page.page(log, of.folder),
             say=say,
         )
+
+    if args.lines:
+        lines = MotionsByLines(sys.stdout, sys.stdin)
+        log = investigated(lines.play, lines.say)
+        return 1 if log.stopped in (Stop.FAULT, Stop.INTERRUPTED) else 0
+    say = partial(print, flush=True)
+    consent = (lambda words: True) if args.attended else _asked
+    with _graph(args, rig) as client, paused_when_interrupted(client, moving=True):
+        log = investigated(MotionPlayer(client, consent).play, say)
     say(f'Page: {of.folder / PAGE}')
     return 1 if log.stopped in (Stop.FAULT, Stop.INTERRUPTED) else 0
 

@@ -15,12 +15,11 @@ from typing import Any
 from endoscope_bringup.operating.status import calibration_in_words, status_of
 from endoscope_bringup.progress_line import ShareBar
 from endoscope_core.control import ranges_in_words
-from endoscope_core.errors import FileError
 from endoscope_nodes import names
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import GraphError
 from endoscope_nodes.client.graph_parameters import read_parameter, read_parameters, set_parameters
-from endoscope_nodes.client.plant_adoption import adopt
+from endoscope_nodes.client.plant_adoption import AdoptedPlants, plant_text
 
 _OF_A_DEVICE = {
     'tare': names.LOAD_CELLS_TARE,
@@ -73,24 +72,10 @@ def act(client: GraphClient, args: argparse.Namespace) -> Reply:
     return Reply((state,))
 
 
-def _text_of(file: str) -> str:
-    try:
-        return Path(file).read_text(encoding='utf-8-sig')
-    except OSError as error:
-        raise FileError(f'cannot read {file}: {error.strerror}') from error
-    except UnicodeDecodeError as error:
-        raise FileError(f'{file} is not a plant file: {error.reason}') from error
-
-
 def _adopt(client: GraphClient, file: str | None, patience_s: float) -> Reply:
     """Put a plant file into force, or without one the plant before."""
-    if file is None:
-        now = adopt(client, '', patience_s)
-    else:
-        text = _text_of(file)
-        if not text.strip():
-            raise FileError(f'plant file {file} is empty: give a plant.yaml')
-        now = adopt(client, text, patience_s)
+    text = '' if file is None else plant_text(Path(file))
+    now = AdoptedPlants(client).adopt(text, patience_s)
     reach = [ranges_in_words(now.ranges, names.JOINTS)] if now.ranges else []
     values = {
         'plant': now.hash,

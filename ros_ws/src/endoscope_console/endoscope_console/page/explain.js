@@ -1,11 +1,14 @@
 /** Explanations of recordings of this machine: asked for, followed, read, and their next experiment played. */
 
 import { $, each, make, set, toggle, write } from './elements.js';
+import { Investigations } from './investigations.js';
 
 export class Explain {
   constructor(app) {
     this._app = app;
     this._report = null;
+    this._investigations = new Investigations(app, (path) => this._open(path), (plant) => this._adopt(plant));
+    $('undo').addEventListener('click', () => this._adopt(null));
     $('ask').addEventListener('submit', (event) => {
       event.preventDefault();
       this._ask();
@@ -19,8 +22,17 @@ export class Explain {
     this._look();
   }
 
+  /** What is asked on any of the pages. */
+  ask() {
+    this._investigations.ask();
+  }
+
   render() {
     const { state, mine, role } = this._app;
+    this._investigations.render();
+    const adopted = state?.adopted;
+    write($('in-force').querySelector('p'), adopted ? adopted.words : 'no compensator says which');
+    toggle($('undo'), 'disabled', !mine || !adopted?.undo);
     const mayAsk = role === 'operator';
     toggle($('ask-go'), 'disabled', !mayAsk);
     const { recording = false, bag = '' } = state?.recorder ?? {};
@@ -42,6 +54,9 @@ export class Explain {
       toggle(card.querySelector('.play'), 'hidden', !e.experiment);
       toggle(card.querySelector('.play'), 'disabled', !mine);
       card.querySelector('.open').dataset.report = e.report ?? '';
+      toggle(card.querySelector('.adopt'), 'hidden', !e.improved);
+      toggle(card.querySelector('.adopt'), 'disabled', !mine);
+      card.querySelector('.adopt').dataset.plant = e.improved;
     });
     const newest = explanations.find((e) => e.report);
     // A report is large: it is fetched when it can be seen.
@@ -100,6 +115,7 @@ export class Explain {
       make('div', { class: 'row' },
         button('open', 'Open the report', ({ target }) => this._open(target.dataset.report)),
         button('play', 'Play the next experiment', () => this._play(id)),
+        button('adopt', 'Adopt the plant', ({ target }) => this._adopt(target.dataset.plant)),
         button('cancel', 'Cancel', () => this._app.orders.give({ op: 'cancel', explanation: id }))));
   }
 
@@ -108,6 +124,15 @@ export class Explain {
     write($('ask-answer'), answer.ok ? '' : `Refused: ${answer.why}`);
     // What moves has to be seen: the dead-man counts only there.
     if (answer.ok) this._app.show('operate');
+  }
+
+  /** Have the compensator invert a plant that was found, or the one before. */
+  async _adopt(plant) {
+    write($('adopt-answer'), plant ? 'The plant is being tried …' : '');
+    const answer = await this._app.orders.give({ op: 'adopt', plant });
+    const code = answer.code ? ` (${answer.code.replaceAll('_', ' ')})` : '';
+    const done = plant ? '' : answer.why;
+    write($('adopt-answer'), answer.ok ? done : `Refused${code}: ${answer.why}`);
   }
 
   _open(path) {

@@ -62,10 +62,12 @@ export function nextStep({ connected, current, role, mine, state, stateAge, rest
     if (rests) return { step: 0, text: 'Held. The cause of the fault is gone; Enable can be held in a moment.' };
     return { step: 2, text: 'The cause of the fault is gone. Hold Enable for 1 s.' };
   }
+  if (state.prepares) return { step: 0, text: 'The motion is being prepared. It can be enabled in a moment.' };
   const orKey = touch ? '.' : ', or key E.';
   const hold = touch ? 'Hold the left area and the pad' : 'Hold Space';
   if (state.operating_state === 'PAUSED') return { step: 2, text: `Paused, position held. Hold Resume for 1 s${orKey}` };
   if (state.operating_state !== 'ENABLED') return { step: 2, text: `Hold Enable for 1 s${orKey} The motors then hold.` };
+  if (state.investigates && !playing) return { step: 0, text: 'Let go: the recording begins or ends.' };
   if (deadMan?.state === 'ENGAGED') {
     const verb = playing ? `Playing ${played(state)}, ${Math.round(100 * (playing.progress ?? 0))} % done` : 'Following';
     return { step: 5, text: `${verb}. Let go, and it stops.` };

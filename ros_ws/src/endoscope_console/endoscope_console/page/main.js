@@ -102,6 +102,7 @@ function render() {
   if (!app.sees()) readings([]);
   if (app.tab === 'see') see.render();
   if (app.tab === 'explain') explain.render();
+  explain.ask();
 }
 
 function connection() {

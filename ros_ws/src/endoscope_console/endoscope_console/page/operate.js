@@ -191,7 +191,7 @@ export class Operate {
     write(claim, mine ? 'Give back' : holder && holder !== app.you ? 'Take over …' : 'Take the controls');
     set(claim, 'class', mine ? '' : 'main');
     toggle(claim, 'disabled', app.claiming || !app.connected || app.role !== 'operator');
-    this._holds.KeyE.enabled = may && now !== null && now !== 'ENABLED' && !rests;
+    this._holds.KeyE.enabled = may && now !== null && now !== 'ENABLED' && !rests && !state.prepares;
     write($('enable').querySelector('span'), now === 'PAUSED' ? 'Resume' : 'Enable');
     this._holds.KeyH.enabled = may && now === 'ENABLED' && !busy;
     this._holds.KeyC.enabled = may && now === 'ENABLED' && !busy;
@@ -244,6 +244,7 @@ export class Operate {
     toggle($('record'), 'disabled', !this.app.mayRecord());
     set($('record'), 'aria-pressed', String(Boolean(recorder.recording)));
     write($('record'), recorder.recording ? 'Stop recording' : 'Record');
+    toggle($('mark'), 'disabled', !this.app.mayRecord());
   }
 
   async _order(order, name) {
@@ -321,6 +322,13 @@ export class Operate {
       this._order({ op: 'state', command: 'disable' }, 'Disable');
     });
     click('record', () => this._order({ op: 'record', on: !this.app.state?.recorder?.recording }, 'Record'));
+    $('keep').addEventListener('submit', (event) => {
+      event.preventDefault();
+      this._order({ op: 'mark', reason: $('mark-reason').value }, 'Keep');
+      $('mark-reason').value = '';
+      // Keys bend again.
+      document.activeElement?.blur();
+    });
     click('mode-position', () => this._mode('position'));
     click('mode-speed', () => this._mode('speed'));
     $('compensator').addEventListener('change', ({ target }) => {

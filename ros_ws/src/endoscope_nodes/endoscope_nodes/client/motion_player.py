@@ -59,6 +59,7 @@ class MotionPlayer:
         self._consent = consent
         self._hold_to_play = hold_to_play
         self._withdrawn = withdrawn
+        self.prepares = False  # between consent and the moment in which a person may enable
 
     def play(self, motion: PlayedMotion, file: Path, bag: Path) -> None:
         """Play a motion, which a file holds, and record it to a bag that does not exist.
@@ -70,9 +71,14 @@ class MotionPlayer:
         self._look()
         if not self._consent(f'Play this motion: {motion.words}?'):
             raise NotPlayedError('the motion was not wanted')
+        self.prepares = True
         self._look()
         with ExitStack() as after:
+            if client.state == 'ENABLED':
+                # In a session that goes on, the master would come as a second sender.
+                client.ask('disable', PATIENCE_S)
             self._as_commanded(after)
+            self.prepares = False
             try:
                 if self._hold_to_play:
                     # Nobody knows how long that takes: it is no part of the recording.

@@ -1,14 +1,17 @@
 """The messages ``compensator/adopt`` and ``compensator/plant``, and who asks by them."""
 
 import json
+import threading
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
 
 from endoscope_core.control import AdoptionCode, BendingRange
+from endoscope_core.errors import FileError
 from endoscope_nodes import names
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import PATIENCE_S, GraphError
@@ -123,50 +126,93 @@ class PlantInForce:
             return None
 
 
-def adopt(client: GraphClient, plant: str, patience_s: float = PATIENCE_S) -> PlantInForce:
-    """Have a plant file's text put into force; empty: the plant before.
-
-    Raises
-    ------
-    RefusedAdoptionError
-        If it is refused: why, with a code.
-    GraphError
-        If nobody answers in time.
-    """
-    if client.state == 'FAULT':
-        client.wait_until(lambda: bool(client.why), patience_s)
-        raise RefusedAdoptionError(
-            AdoptionCode.FAULT, f'the slave is in FAULT: {client.why or "no cause"}'
-        )
-    heard: list[PlantInForce] = []
-
-    def take(data: bytes, _: int) -> None:
-        told = PlantInForce.of_message(deserialize_message(data, DiagnosticArray))
-        if told is not None:
-            heard.append(told)
-
-    client.listen(DiagnosticArray, names.COMPENSATOR_PLANT, take, latched=True)
-    publisher = client.node.create_publisher(DiagnosticArray, names.COMPENSATOR_ADOPT, EVENT)
+def plant_text(file: Path) -> str:
+    """Text of a plant file; FileError where it cannot be read or is empty."""
     try:
+        text = file.read_text(encoding='utf-8-sig')
+    except OSError as error:
+        raise FileError(f'cannot read {file}: {error.strerror}') from error
+    except UnicodeDecodeError as error:
+        raise FileError(f'{file} is not a plant file: {error.reason}') from error
+    if not text.strip():
+        raise FileError(f'plant file {file} is empty: give a plant.yaml')
+    return text
+
+
+class AdoptedPlants:
+    """Hears which adopted plant is in force in a graph, and asks for another.
+
+    Who has asked stays the one sender of requests until he leaves: a second one is refused.
+    """
+
+    def __init__(self, client: GraphClient) -> None:
+        self._client = client
+        self.in_force: PlantInForce | None = None  # as last told; None before
+        self._asked = ''
+        self._publisher: Publisher | None = None
+        self._asking = threading.Lock()
+        self._answer: PlantInForce | None = None
+        client.listen(DiagnosticArray, names.COMPENSATOR_PLANT, self._take, latched=True)
+
+    def _take(self, data: bytes, _: int) -> None:
+        told = PlantInForce.of_message(deserialize_message(data, DiagnosticArray))
+        if told is None:
+            return
+        self.in_force = told
+        if told.id == self._asked:
+            self._answer = told
+
+    @property
+    def _final(self) -> PlantInForce | None:
+        answer = self._answer
+        return None if answer is None or answer.state == OrderState.EXECUTING else answer
+
+    def adopt(self, plant: str, patience_s: float = PATIENCE_S) -> PlantInForce:
+        """Have a plant file's text put into force; empty: the plant before.
+
+        Raises
+        ------
+        RefusedAdoptionError
+            If it is refused: why, with a code.
+        GraphError
+            If nobody answers in time.
+        """
+        client = self._client
+        if client.state == 'FAULT':
+            client.wait_until(lambda: bool(client.why), patience_s)
+            raise RefusedAdoptionError(
+                AdoptionCode.FAULT, f'the slave is in FAULT: {client.why or "no cause"}'
+            )
+        with self._asking:
+            answer = self._answer_to(plant, patience_s)
+        if answer.state != OrderState.SUCCEEDED:
+            raise RefusedAdoptionError(answer.code, answer.answer)
+        return answer
+
+    def _answer_to(self, plant: str, patience_s: float) -> PlantInForce:
+        client = self._client
+        if self._publisher is None:
+            self._publisher = client.node.create_publisher(
+                DiagnosticArray, names.COMPENSATOR_ADOPT, EVENT
+            )
+        publisher = self._publisher
         found = client.wait_until(
-            lambda: bool(heard and publisher.get_subscription_count() and client.graph_ns),
+            lambda: bool(self.in_force and publisher.get_subscription_count() and client.graph_ns),
             patience_s,
         )
         if not found:
             raise GraphError(f'no compensator takes plants in {client.where}')
         request = AdoptionRequest(f'{time.time_ns()}', plant, client.session)
+        self._answer, self._asked = None, request.id
         publisher.publish(request.message(client.graph_ns))
-        known: Sequence[PlantInForce] = ()
+        client.wait_for(lambda: self._final is not None, 'the compensator', patience_s)
+        answer = self._final
+        assert answer is not None
+        return answer
 
-        def is_answered() -> bool:
-            nonlocal known
-            known = [each for each in heard if each.id == request.id]
-            return bool(known) and known[-1].state != OrderState.EXECUTING
-
-        client.wait_for(is_answered, 'the compensator', patience_s)
-    finally:
-        client.node.destroy_publisher(publisher)
-    answer = known[-1]
-    if answer.state != OrderState.SUCCEEDED:
-        raise RefusedAdoptionError(answer.code, answer.answer)
-    return answer
+    def leave(self) -> None:
+        """Leave the place of the one sender to others, once what was asked has been answered."""
+        with self._asking:
+            if self._publisher is not None:
+                self._client.node.destroy_publisher(self._publisher)
+                self._publisher = None

@@ -1,0 +1,44 @@
+"""Motions that another program plays: named and answered in lines of JSON."""
+
+import json
+from pathlib import Path
+from typing import TextIO
+
+from endoscope_core.errors import EndoscopeError, NotPlayedError, RigStoppedError
+from endoscope_explain.investigation.motions import Motion
+
+
+class MotionsByLines:
+    """Asks for each motion in a line, and goes on with what the line says that answers it."""
+
+    def __init__(self, asked: TextIO, answers: TextIO) -> None:
+        self._asked, self._answers = asked, answers
+
+    def say(self, sentence: str) -> None:
+        """Say a sentence of the log."""
+        self._write({'say': sentence})
+
+    def play(self, motion: Motion, file: Path, bag: Path) -> None:
+        """Have a motion played and recorded; see `endoscope_nodes.client.motion_player`."""
+        asked = {
+            'words': motion.words,
+            'why': motion.why,
+            'duration': motion.duration,
+            'file': str(file.absolute()),
+            'bag': str(bag.absolute()),
+        }
+        self._write({'play': asked})
+        line = self._answers.readline()
+        if not line:
+            raise NotPlayedError('the program that plays the motions has ended')
+        answer = json.loads(line)
+        became, why = answer['became'], answer['why']
+        if became == 'not_played':
+            raise NotPlayedError(why)
+        if became == 'rig_stopped':
+            raise RigStoppedError(why)
+        if became != 'played':
+            raise EndoscopeError(why)
+
+    def _write(self, told: dict[str, object]) -> None:
+        print(json.dumps(told), file=self._asked, flush=True)
