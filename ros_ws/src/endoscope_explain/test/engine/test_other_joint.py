@@ -1,0 +1,42 @@
+"""What was found beside one motion of the other joint, seen beside another one."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from endoscope_core.physics.description import EffectSpec, PlantDescription
+from endoscope_core.physics.layout import IN_OTHER_JOINT
+from endoscope_explain.fit.nominal import with_references
+from endoscope_explain.observe.observation import observe
+from endoscope_explain.search.levels import search
+from endoscope_explain.search.other_joint import stands_beside
+
+
+def searched(record, *effects):
+    """The search on `bend_y` as if `bend_x` stood still, and how `bend_x` moved."""
+    recording = record(PlantDescription(effects=effects), 12.0)
+    plant = PlantDescription()
+    observations = observe(recording, plant)
+    _, references = with_references(recording, observations, plant, 0.15, 2)
+    fitted, described = references[1]
+    moved = fitted.model.observation.inputs[0, :, IN_OTHER_JOINT].copy()
+    still = fitted.model.observation.beside(np.zeros_like(moved))
+    pair = [
+        dataclasses.replace(f, model=dataclasses.replace(f.model, observation=still))
+        for f in (fitted, described)
+    ]
+    return search([tuple(pair)], 2, 1), moved
+
+
+@pytest.mark.parametrize(
+    ('effect', 'stands'),
+    [
+        (EffectSpec('load_cell_gain', 'bend_y', {}), True),
+        (EffectSpec('cross_coupling', 'bend_y', {}), False),
+    ],
+)
+def test_only_what_depends_on_the_other_joint_is_searched_again(record, effect, stands):
+    tried, moved = searched(record, effect)
+    assert tried.levels
+    assert stands_beside(tried, moved, (), 2) is stands
