@@ -275,6 +275,23 @@ BENCHES: dict[str, Bench] = {
             _jobs(),
         ),
     ),
+    'adopt': Bench(
+        'adopt',
+        'how a rig tracks by the inverse of the plant that was found',
+        'Draws for every seed a rig with a large effect that its description lacks, explains a '
+        'recording of it, adopts what was found, and prints how the tip tracks another motion by '
+        'the inverse of the plant as described, as found and as it is. Seeds from 1 to 100 are for '
+        'development; of others, first runs are reported. Exits 1 where half of the rigs keep more '
+        'than 25 % of the error.',
+        (
+            _seeds('of effects that an inverse can know (1-3)'),
+            _option('--others', 'of the other effects (none)', type=seeds, metavar='A-B'),
+            _option('--foreign', 'of another simulator (none)', type=seeds, metavar='A-B'),
+            _file('--json', 'file for all rows; what is in it is not done again'),
+            _seconds(86400.0, 'take what there is after so long, in s', '--within'),
+            _jobs(),
+        ),
+    ),
     'limits': Bench(
         'concealed.limits',
         'how weak an effect may be and still be named',

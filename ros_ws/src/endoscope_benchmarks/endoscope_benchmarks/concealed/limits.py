@@ -40,7 +40,7 @@ def limit_of(effect: str, seeds: range) -> str:
 def _drawn(effect: str, seed: int, share: float) -> Case | None:
     """The case; None where the effect cannot move as much, since it has an end."""
     try:
-        return as_strong(effect, seed, share)
+        return as_strong(effect, seed, (share, share))
     except RuntimeError:
         return None
 

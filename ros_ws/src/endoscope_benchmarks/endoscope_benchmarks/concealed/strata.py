@@ -173,12 +173,12 @@ def other_simulator(generator: Generator, seed: int) -> Case:
     return replace(drawn(OTHER, seed, 0)[0], seed=seed)
 
 
-def as_strong(effect: str, seed: int, share: float) -> Case:
-    """One effect that moves a share of the signal; RuntimeError if it moves none by as much."""
+def as_strong(effect: str, seed: int, aims: tuple[float, float]) -> Case:
+    """One effect that moves a share of the signal between two; RuntimeError if none moves that."""
     # The rig is the same for the same seed.
     generator = np.random.default_rng([_BY_STRENGTH, DRAWN.index(effect), seed])
     rig = _rig(generator, _joints_of(effect))
-    return _finished(generator, seed, rig, *_with_effect(generator, rig, effect, (share, share)))
+    return _finished(generator, seed, rig, *_with_effect(generator, rig, effect, aims))
 
 
 STRATA: dict[str, Callable[[Generator, int], Case]] = {

@@ -49,7 +49,7 @@ def drawn(form: str, seed: int, number: int, effect: str | None = None) -> tuple
     """Draw a rig of `SIMULATORS` or `SLAVE` and, unless given, its effect; its truth as data."""
     generator = np.random.default_rng([seed, number])
     if form == OTHER:
-        return _other(generator, effect)
+        return of_other_simulator(generator, effect)
     return _of_slave(generator, effect) if form == SLAVE else _own(generator, effect)
 
 
@@ -71,7 +71,8 @@ def _of_slave(generator: Generator, effect: str | None) -> tuple[Case, dict]:
 def _own(generator: Generator, effect: str | None) -> tuple[Case, dict]:
     case_seed = int(generator.integers(100, 2**31))
     if effect is not None:
-        case = as_strong(effect, case_seed, float(np.exp(generator.uniform(*np.log(AIM)))))
+        share = float(np.exp(generator.uniform(*np.log(AIM))))
+        case = as_strong(effect, case_seed, (share, share))
     else:
         kinds, chances = ('nulls', 'mixed_forms', 'catalogue'), [NOTHING, UNKNOWN]
         chosen = generator.choice(kinds, p=[*chances, 1.0 - sum(chances)])
@@ -79,7 +80,10 @@ def _own(generator: Generator, effect: str | None) -> tuple[Case, dict]:
     return case, {'concealed': [law.name for law in case.laws]} | plant_to_mapping(case.true)
 
 
-def _other(generator: Generator, effect: str | None) -> tuple[Case, dict]:
+def of_other_simulator(
+    generator: Generator, effect: str | None, aims: tuple[float, float] = AIM
+) -> tuple[Case, dict]:
+    """A rig of sliding nodes; an effect that is given moves a share of the signal between two."""
     described = described_rig(generator, 1)
     true = true_rig(generator, described)
     (name, joint), sensors = *true.joints.items(), true.sensors
@@ -88,7 +92,7 @@ def _other(generator: Generator, effect: str | None) -> tuple[Case, dict]:
     laws, share, concealed = Laws(), 0.0, tuple[Law, ...]()
     if effect is not None or generator.random() >= NOTHING:
         effect = effect or str(generator.choice(list(FORMS)))
-        laws, share = _as_strong(generator, effect, joint, command)
+        laws, share = _as_strong(generator, effect, joint, command, aims)
         concealed = (law_of_effect(effect, name),)
     noise = int(generator.integers(2**31))
     recording, other = (
@@ -103,7 +107,11 @@ def _other(generator: Generator, effect: str | None) -> tuple[Case, dict]:
 
 
 def _as_strong(
-    generator: Generator, effect: str, joint: JointParameters, command: Array
+    generator: Generator,
+    effect: str,
+    joint: JointParameters,
+    command: Array,
+    aims: tuple[float, float],
 ) -> tuple[Laws, float]:
     """A law that moves a drawn share of the signal, drawn again where it cannot."""
     bare = read(joint, Laws(), command, FEW_NODES)
@@ -113,7 +121,7 @@ def _as_strong(
         laws = drawn_laws(generator, effect, duration, reached)
         return laws, partial(_roughly, joint, laws, command), 1.0
 
-    laws, strength, share = drawn_as_strong(generator, AIM, draw)
+    laws, strength, share = drawn_as_strong(generator, aims, draw)
     return laws(strength), share
 
 
