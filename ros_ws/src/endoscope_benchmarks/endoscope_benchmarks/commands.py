@@ -292,6 +292,17 @@ BENCHES: dict[str, Bench] = {
             _jobs(),
         ),
     ),
+    'watched': Bench(
+        'watch.cost',
+        'what it costs the graph that the rig is watched',
+        'Runs all nodes in one process, 1000 ticks a second, with and without the watch, in '
+        'lock-step and by the wall clock, and prints CPU time, ticks and the time from command to '
+        'motor. Exits 1 where watching costs more than 10 % of a core.',
+        (
+            _seconds(10.0, 'of each run, once the watch has learnt'),
+            _count('--rounds', 'of the runs', 2),
+        ),
+    ),
     'limits': Bench(
         'concealed.limits',
         'how weak an effect may be and still be named',

@@ -24,7 +24,7 @@ from launch_ros.substitutions import FindPackageShare
 PROGRAMS = (
     *('motor_driver', 'load_cells', 'em_tracker'),
     *('supervisor', 'compensator', 'controller', 'calibration', 'master'),
-    *('instrument_model', 'recorder'),
+    *('instrument_model', 'watch', 'recorder'),
 )
 
 
@@ -44,6 +44,8 @@ def generate_launch_description() -> LaunchDescription:
             executable=executable,
             namespace=LaunchConfiguration('namespace'),
             parameters=[LaunchConfiguration('config'), files],
+            # Of every process: the recorder keeps more where the rig is watched.
+            ros_arguments=['-p', ['watch:active:=', LaunchConfiguration('watch')]],
             output='screen',
             **others,
         )
@@ -82,6 +84,12 @@ def generate_launch_description() -> LaunchDescription:
                 choices=['true', 'false'],
                 description='true for the wall clock: a rig with a real device needs it where each '
                 'node has a process, and one process takes it there by itself',
+            ),
+            DeclareLaunchArgument(
+                'watch',
+                default_value='false',
+                choices=['true', 'false'],
+                description='whether the rig is compared with its plant while it moves',
             ),
             # In one process the graph decides for itself unless it is told.
             SetParameter('use_sim_time', False, condition=IfCondition(real_time)),

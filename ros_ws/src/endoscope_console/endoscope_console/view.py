@@ -19,6 +19,7 @@ from endoscope_nodes.client.graph_listener import (
     MASTER,
     RECORDER,
     SUPERVISOR,
+    WATCH,
     Health,
 )
 from endoscope_nodes.client.plant_adoption import PlantInForce
@@ -185,6 +186,7 @@ class View:
         tension = max(zip(self._graph.pictures.tensions, WIRES, strict=False), default=None)
         recorder = client.health.get(RECORDER)
         compensator = client.compensator
+        watch = client.health.get(WATCH)
         reason = operations.beat.said.reason
         factor = client.factor
         found = [
@@ -211,6 +213,8 @@ class View:
                 Alarm('compensator', Level.LOW, 'nothing is compensated'),
             ),
         ]
+        if watch is not None and _LEVELS[_level(watch)] == 'warning':
+            found.append((True, Alarm('watch', Level.MEDIUM, watch.message)))
         if tension is not None and tension[0] > _TENSE * self._rig.tension.ceiling:
             text = f'{tension[1]} is above {_TENSE * self._rig.tension.ceiling:.0f} N'
             found.append((True, Alarm('tension', Level.HIGH, text)))

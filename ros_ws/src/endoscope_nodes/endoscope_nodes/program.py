@@ -150,6 +150,12 @@ instrument_model = Program(
     'Shows other programs the instrument and its bending: a description as URDF, the angles of its '
     'joints, and where its links are.',
 )
+watch = Program(
+    'watch',
+    'nodes.watch:WatchNode',
+    'Compares the rig with its plant while it moves, where it is switched on, and tells that it is '
+    'another one and at which stage.',
+)
 recorder = Program(
     'recorder',
     'nodes.recorder:RecorderNode',
@@ -171,7 +177,7 @@ conductor = OldName('conductor', simulation_clock)
 
 _COMPOSED = (
     *(motor_driver, load_cells, em_tracker, supervisor),
-    *(compensator, controller, calibration, master, instrument_model, recorder),
+    *(compensator, controller, calibration, master, instrument_model, watch, recorder),
 )
 PROGRAMS = {program.nodes[0]: program for program in (*_COMPOSED, replay, simulation_clock)}
 """The program of each node of the package, by node name."""

@@ -114,7 +114,14 @@ TOPICS = (
         offered=SENSOR_OFFERED,
         asked=SENSOR_ASKED,
         said_by=('em_tracker',),
-        heard_by=('console', 'compensator', 'controller', 'calibration', 'instrument_model'),
+        heard_by=(
+            'console',
+            'compensator',
+            'controller',
+            'calibration',
+            'instrument_model',
+            'watch',
+        ),
         one_sender=True,
     ),
     Topic(
@@ -138,6 +145,7 @@ TOPICS = (
         offered=SENSOR_OFFERED,
         asked=SENSOR_ASKED,
         said_by=('motor_driver',),
+        heard_by=('watch',),
         one_sender=True,
     ),
     Topic(
@@ -150,7 +158,7 @@ TOPICS = (
         asked=SENSOR_ASKED,
         said_by=('motor_driver',),
         heard_by=(
-            *('console', 'compensator', 'controller', 'calibration', 'supervisor'),
+            *('console', 'compensator', 'controller', 'calibration', 'supervisor', 'watch'),
             'load_cells',
         ),
         one_sender=True,
@@ -163,7 +171,7 @@ TOPICS = (
         offered=SENSOR_OFFERED,
         asked=SENSOR_ASKED,
         said_by=('load_cells',),
-        heard_by=('calibration', 'supervisor'),
+        heard_by=('calibration', 'supervisor', 'watch'),
         one_sender=True,
     ),
     Topic(
@@ -272,7 +280,7 @@ TOPICS = (
         offered=RESULT,
         asked=RESULT,
         said_by=('compensator',),
-        heard_by=('console',),
+        heard_by=('console', 'watch'),
         one_sender=True,
     ),
     Topic(
@@ -329,10 +337,11 @@ TOPICS = (
         names.RECORDER_MARK,
         'std_msgs/msg/String',
         'when somebody asks',
-        'an operator marks this moment, in words or with an empty text: the recorder writes what '
-        'came before and the 2 s after as a bag',
-        offered=None,
+        'an operator, or the watch, marks this moment, in words or with an empty text: the '
+        'recorder writes what came before and the 2 s after as a bag',
+        offered=EVENT,
         asked=EVENT,
+        said_by=('watch',),
         heard_by=('recorder',),
     ),
     Topic(
@@ -446,6 +455,12 @@ SERVICES = (
         names.RECORDER_STOP,
         'recorder',
         'ends the recording, and says how many messages it has and how many were lost',
+    ),
+    Service(
+        names.WATCH_RESTART,
+        'watch',
+        'forgets its alarms and what it has learnt of the rig, and learns anew; refused while it '
+        'is off',
     ),
     Service(
         names.LOAD_CELLS_TARE,

@@ -22,6 +22,7 @@ _ACTIONS = {
     'tare': 'take the tension of the last second for zero; wires slack, shafts at rest',
     'register_straight': "take the tracker's pose of the last second for straight",
     'reboot': 'restart the servos without torque; not while the slave is ENABLED',
+    'watch': 'have the watch forget its alarms, and learn the rig anew',
     'set': 'give a node a new value of a parameter',
     'get': "print a parameter's value, or all parameters of a node with values and ranges",
     'record': 'begin or end a recording; or mark this moment, with TEXT: what came before and the '

@@ -25,6 +25,7 @@ _OF_A_DEVICE = {
     'tare': names.LOAD_CELLS_TARE,
     'register_straight': names.REGISTER_STRAIGHT,
     'reboot': names.MOTOR_REBOOT,
+    'watch': names.WATCH_RESTART,
 }
 
 _NEXT_WORD_S = 1.5

@@ -25,6 +25,7 @@ POLL_S = 0.05
 SUPERVISOR = 'supervisor: operating state'
 RECORDER = 'recorder: recording'
 EVENTS = 'recorder: events'
+WATCH = 'watch: rig'
 MASTER = f'{names.MASTER_NODE}: commands'
 LOCK_STEP = f'{names.CLOCK_NODE}: lock-step'
 COMMANDS = ('compensator: commands', 'compensator: calibration commands', 'motor_driver: commands')

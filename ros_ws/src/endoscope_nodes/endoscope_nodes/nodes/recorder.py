@@ -5,7 +5,7 @@ import math
 import struct
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rclpy.clock import Clock, ClockType
@@ -51,6 +51,8 @@ _STAMP = struct.Struct('<iI')
 _SECOND = 1_000_000_000
 _LOOK_PERIOD_S = 0.1
 _UNTYPED_S = 2.0
+_WATCHED_S = 60.0
+"""What is kept at least where the rig is watched: the bag of an alarm begins before the change."""
 _MEGABYTE = 1_000_000
 
 
@@ -93,6 +95,8 @@ class RecorderNode(EndoscopeNode):
         self._bag = ''
         p = self.parameters(RecorderParameters, self._on_parameters)
         self._bag = p.bag
+        if p.keep and context.told('watch', 'active'):
+            p = replace(p, keep=max(p.keep, _WATCHED_S))
         self._topics = checked_names(p.topics)
         self._events = EventKeeping(
             self,

@@ -108,6 +108,10 @@ class NodeContext:
             given = node._parameter_overrides  # noqa: SLF001
             return {key: value.value for key, value in given.items()}
 
+    def told(self, name: str, parameter: str) -> object:
+        """Value that this process was told to give a node's parameter; None for none."""
+        return {**self.given(name), **self._overrides.get(name, {})}.get(parameter)
+
     @contextmanager
     def _asked(self, name: str) -> Iterator[Node]:
         node = Node(

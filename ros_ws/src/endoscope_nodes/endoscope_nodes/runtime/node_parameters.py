@@ -295,6 +295,16 @@ class MasterParameters:
 
 
 @dataclass(frozen=True)
+class WatchParameters:
+    """Parameters of the watch."""
+
+    active: bool = parameter(
+        False, 'whether the rig is compared with its plant while it moves; off, it hears nothing'
+    )
+    plant: str = parameter('', 'plant.yaml that describes the rig; empty for that of the rig file')
+
+
+@dataclass(frozen=True)
 class RecorderParameters:
     """Parameters of the recorder."""
 
@@ -307,13 +317,13 @@ class RecorderParameters:
     autostart: bool = parameter(True, 'record from the start instead of on recorder/start')
     keep: float = parameter(
         20.0,
-        'what came last is kept in memory for so long, for the bag of a fault or a mark; 0 for '
-        'none of these',
+        'what came last is kept in memory for so long, for the bag of a fault or a mark, and for '
+        'at least 60 s where the watch is active; 0 for none of these',
         unit='s',
         low=0.0,
         high=600.0,
     )
-    keep_room: int = parameter(40, 'memory for that; 10^6 bytes', unit='MB', low=1, high=4000)
+    keep_room: int = parameter(60, 'memory for that; 10^6 bytes', unit='MB', low=1, high=4000)
     keep_bags: int = parameter(
         50,
         'bags of faults and marks in a folder, beyond which no more are written; none is deleted',
@@ -387,6 +397,7 @@ OF_NODE: dict[str, tuple[type, ...]] = {
     'calibration': (CalibrationParameters,),
     names.MASTER_NODE: (MasterParameters,),
     'instrument_model': (),
+    'watch': (WatchParameters,),
     'recorder': (RecorderParameters,),
     'replay': (ReplayParameters,),
     names.CLOCK_NODE: (SimulationClockParameters,),

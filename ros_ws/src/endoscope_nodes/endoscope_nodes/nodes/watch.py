@@ -1,0 +1,276 @@
+"""Watches whether the rig that moves is still the one that its plant describes, and tells."""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from numpy.typing import NDArray
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from threadpoolctl import threadpool_limits
+
+from endoscope_bags.cdr_decoding import Payloads
+from endoscope_bags.errors import BagError
+from endoscope_bags.joint_state_series import JointStateSeries, decode_joint_states
+from endoscope_core.errors import FileError
+from endoscope_core.monitoring import Alarm, RigWatch
+from endoscope_core.monitoring.criteria import FALSE_ALARMS_PER_HOUR
+from endoscope_core.monitoring.rig_watch import BLOCK_S, LEARNT, WINDOWS
+from endoscope_core.physics import PlantDescription
+from endoscope_core.physics.plant_file import plant_from_mapping
+from endoscope_core.schema import parse_yaml
+from endoscope_nodes import names, topics
+from endoscope_nodes.client.plant_adoption import PlantInForce
+from endoscope_nodes.runtime.diagnostics import OK, STALE, WARN, Report
+from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.node_context import NodeContext, load_slave
+from endoscope_nodes.runtime.node_parameters import WatchParameters
+from endoscope_nodes.runtime.qos import EVENT, RESULT, profile
+from endoscope_nodes.runtime.streams import RawSubscription
+
+_SECOND = 1_000_000_000
+# Of a stream at 1 kHz, four times what comes from one look to the next.
+_ASKED = profile(replace(topics.SENSOR_ASKED, depth=1000))
+_NAMED_S = 10.0
+"""How long after an alarm its stage is waited for before the last seconds are kept."""
+_SILENT_S = 1.0
+# What is judged is learnt only once it is older than any change that is looked for.
+_LEARNING_S = BLOCK_S * float(LEARNT + WINDOWS[-1])
+_Array = NDArray[np.float64]
+
+
+@dataclass
+class _Stream:
+    """Joint states of fixed names that wait to be read."""
+
+    subscription: RawSubscription
+    names: Sequence[str]
+    columns: Callable[[JointStateSeries], Sequence[_Array]]  # what is told of them, each (N, J)
+    unreadable: int = 0  # messages without a number of theirs
+
+    def take(self) -> tuple[NDArray[np.int64], _Array]:
+        """Stamps (N,) in ns and values of what waits, as far as it is readable."""
+        data = [message for message, _ in self.subscription.take()]
+        size = np.array([len(each) for each in data], dtype=np.int64)
+        none = np.zeros(len(data), dtype=np.int64)
+        payloads = Payloads(b''.join(data), np.cumsum(size) - size, size)
+        try:
+            if data:
+                said = decode_joint_states(self.subscription.topic, payloads, none, none, none)
+                values = np.hstack(self.columns(said.select(self.names)))
+                # Somebody else's joints on this topic would have none of our numbers.
+                ours = np.isfinite(values).any(axis=1)
+                self.unreadable += int((~ours).sum())
+                return said.stamp_ns[ours], values[ours]
+        except BagError:
+            self.unreadable += len(data)
+        return none[:0], np.empty((0, 0))
+
+
+class WatchNode(EndoscopeNode):
+    """Tells on ``/diagnostics`` that the rig is no longer the one described: where, since when.
+
+    The rig is compared with the plant in force: the adopted one, or else the one described. What
+    is heard is judged four times a second in a thread of its own; the executor is not concerned. An
+    alarm stays until ``watch/restart`` or until another plant is in force, and has the recorder
+    keep the last seconds.
+    """
+
+    def __init__(self, context: NodeContext) -> None:
+        super().__init__('watch', context)
+        p = self.parameters(WatchParameters)
+        self._active = p.active
+        self._streams: dict[str, _Stream] = {}
+        self.diagnostics.add('rig', self._report)
+        self.serve(names.WATCH_RESTART, self._restart)
+        if not p.active:
+            return
+        own = load_slave("watch: parameter 'plant'", p.plant) if p.plant else None
+        self._described = own or context.plant
+        self._source = self._described_by = p.plant or context.plant_name
+        self._adopted = PlantInForce()
+        self._wanted = True
+        self._origin_ns = 0
+        self._newest_s = 0.0
+        self._heard_ns = self.ticker.monotonic_ns()
+        self._told: dict[str, Alarm] = {}
+        self._kept: set[str] = set()
+        # Of small matrices: threads for each would stand in the way of the other nodes.
+        threadpool_limits(1, 'blas')
+        # Compiled here rather than beside the ticks.
+        self.rig_watch = _compiled(self._described)
+        self._streams = {
+            'setpoint': self._stream(
+                names.MOTOR_SETPOINT, names.MOTORS, lambda s: [s.require('position')]
+            ),
+            'motor': self._stream(
+                names.MOTOR_MEASURED,
+                names.MOTORS,
+                lambda s: [s.require('position'), _or_nan(s.effort, s.require('position'))],
+            ),
+            'wires': self._stream(
+                names.WIRES_MEASURED, names.WIRES, lambda s: [s.require('effort')]
+            ),
+            'tracker': self._stream(
+                names.SLAVE_MEASURED, names.JOINTS, lambda s: [s.require('position')]
+            ),
+        }
+        self._marks = self.create_publisher(String, names.RECORDER_MARK, EVENT)
+        self.create_subscription(DiagnosticArray, names.COMPENSATOR_PLANT, self._on_plant, RESULT)
+        self._thread = ThreadPoolExecutor(1)
+        self._judging: Future[None] | None = None
+        self.ticker.every(BLOCK_S, self._look)
+
+    def _stream(
+        self,
+        topic: str,
+        joints: Sequence[str],
+        columns: Callable[[JointStateSeries], Sequence[_Array]],
+    ) -> _Stream:
+        return _Stream(RawSubscription(self, JointState, topic, _ASKED), joints, columns)
+
+    def extra_readers(self) -> list[tuple[str, int]]:
+        """Topics that are read past the executor, and how many publishers each has found."""
+        heard = [stream.subscription for stream in self._streams.values()]
+        return [(each.topic, each.count_publishers()) for each in heard]
+
+    @property
+    def announcement(self) -> str:
+        """Say that it watches."""
+        return f'watching for a rig other than {self._source}' if self._active else ''
+
+    def _on_plant(self, message: DiagnosticArray) -> None:
+        told = PlantInForce.of_message(message)
+        if told is not None and told.hash != self._adopted.hash:
+            self._adopted, self._wanted = told, True
+
+    def _restart(self) -> tuple[bool, str]:
+        if not self._active:
+            return False, "the watch is off: parameter 'active' switches it on"
+        self._wanted = True
+        return True, 'learns anew'
+
+    def _look(self) -> None:
+        """Take what was judged, and have what came since then judged."""
+        if self._judging is not None:
+            if not self._judging.done():
+                return
+            self._judging.result()
+        self._tell()
+        if self._wanted:
+            self._wanted = False
+            self._told, self._kept = {}, set()
+            work = self._begin
+        else:
+            work = self._judge
+        if self.ticker.simulated and not self.ticker.paced:
+            work()
+        else:
+            self._judging = self._thread.submit(work)
+
+    def _begin(self) -> None:
+        """Learn anew, with the plant in force."""
+        plant, self._source = self._described, self._described_by
+        if self._adopted.plant:
+            try:
+                mapping = parse_yaml(self._adopted.plant, 'the adopted plant')
+                plant = plant_from_mapping(mapping)
+                self._source = f'adopted plant {self._adopted.hash}'
+            except FileError as error:
+                self.get_logger().error(f'goes on with the described plant: {error}')
+        for stream in self._streams.values():
+            stream.subscription.take()
+        self.rig_watch = RigWatch(plant)
+        self._origin_ns = 0
+
+    def _judge(self) -> None:
+        taken = {name: stream.take() for name, stream in self._streams.items()}
+        stamps, _ = taken['motor']
+        if len(stamps) and not self._origin_ns:
+            self._origin_ns = int(stamps[0])
+        if not self._origin_ns:
+            return
+        for name, (stamp_ns, values) in taken.items():
+            if len(stamp_ns):
+                seconds = (stamp_ns - self._origin_ns) * 1e-9
+                getattr(self.rig_watch, name).append(seconds, values)
+        if len(stamps):
+            self._heard_ns = self.ticker.monotonic_ns()
+            self._newest_s = float(stamps[-1] - self._origin_ns) * 1e-9
+            self.rig_watch.update(self._newest_s)
+
+    def _tell(self) -> None:
+        """Say what is new, and have the recorder keep what led to it."""
+        news = False
+        for alarm in self.rig_watch.alarms:
+            if self._told.get(alarm.joint) != alarm:
+                self._told[alarm.joint] = alarm
+                self.get_logger().warning(self._in_words(alarm))
+                news = True
+            late = self._newest_s > alarm.at + _NAMED_S
+            if alarm.joint not in self._kept and (alarm.parts or late):
+                self._kept.add(alarm.joint)
+                self._marks.publish(String(data=f'watch: {self._in_words(alarm)}'))
+        if news:
+            self.diagnostics.publish()
+
+    def _in_words(self, alarm: Alarm) -> str:
+        return f'{alarm}, since {self._utc(alarm.since)}, margin {alarm.margin:.1f}'
+
+    def _utc(self, seconds: float) -> str:
+        return f'{datetime.fromtimestamp(seconds + self._origin_ns * 1e-9, UTC):%H:%M:%S} UTC'
+
+    def _report(self) -> Report:
+        if not self._active:
+            return OK, 'off', {}
+        watch = self.rig_watch
+        values: dict[str, object] = {
+            'plant': self._source,
+            'margin': watch.margin,
+            'false alarms an hour': FALSE_ALARMS_PER_HOUR,
+            'begun anew': watch.restarts,
+            'because': watch.restarted_because,
+        }
+        for joint in watch.joints:
+            values[f'{joint.name} learnt [s]'] = BLOCK_S * min(joint.test.learnt, LEARNT)
+        for name, stream in self._streams.items():
+            values[f'{name} unreadable'] = stream.unreadable
+        for alarm in self._told.values():
+            values |= {
+                f'{alarm.joint} told at': self._utc(alarm.at),
+                f'{alarm.joint} since': self._utc(alarm.since),
+                f'{alarm.joint} stage': ' or '.join(alarm.parts),
+                f'{alarm.joint} change': alarm.change,
+                f'{alarm.joint} margin': alarm.margin,
+            }
+        if self._told:
+            return WARN, '; '.join(map(self._in_words, self._told.values())), values
+        if self.ticker.monotonic_ns() - self._heard_ns > _SILENT_S * _SECOND:
+            return STALE, f'nothing is heard of {names.MOTOR_MEASURED}', values
+        if not watch.ready:
+            return OK, f'learning: every joint has to move for {_LEARNING_S:.0f} s', values
+        return OK, f'the rig is as described by {self._source}', values
+
+    def close(self) -> None:
+        """Let the thread end, and leave the topics."""
+        if self._active:
+            self._thread.shutdown()
+        for stream in self._streams.values():
+            stream.subscription.close()
+
+
+def _or_nan(values: _Array | None, like: _Array) -> _Array:
+    return np.full_like(like, np.nan) if values is None else values
+
+
+def _compiled(plant: PlantDescription) -> RigWatch:
+    """A watch, once all that it calls is compiled."""
+    watch = RigWatch(plant)
+    time = np.linspace(0.0, 2.0 * BLOCK_S, 1000)
+    for samples in (watch.setpoint, watch.motor):
+        samples.append(time, np.zeros((len(time), samples.columns)))
+    watch.update(2.0 * BLOCK_S)
+    return RigWatch(plant)
