@@ -107,6 +107,29 @@ def test_an_interruption_pauses_the_graph(motion, tmp_path):
     assert open_bag(tmp_path / 'bag').joint_state(SLAVE_COMMAND).stamp_ns.size
 
 
+def test_what_a_person_has_paused_is_not_enabled_again(motion, tmp_path):
+    given = []
+    with graph() as live:
+        client = live.client
+        player = MotionPlayer(client, lambda words: given.append('go') or True, hold_to_play=True)
+        inner = client.serve
+
+        def person(seconds):
+            if given == ['go'] and not player.prepares:
+                given.append('enable')
+                client.order('enable')
+            elif given == ['go', 'enable'] and client.state == 'ENABLED':
+                given.append('pause')
+                client.order('pause')
+            return inner(seconds)
+
+        client.serve = person
+        with pytest.raises(NotPlayedError, match='PAUSED'):
+            player.play(*motion, tmp_path / 'bag')
+        assert given == ['go', 'enable', 'pause']
+        assert client.state == 'PAUSED'
+
+
 def test_without_a_person_to_ask_it_does_not_begin(tmp_path, capsys):
     save_plant(PlantDescription(), tmp_path / 'plant.yaml')
     words = ['investigate', '--plant', str(tmp_path / 'plant.yaml'), '--out', str(tmp_path / 'out')]

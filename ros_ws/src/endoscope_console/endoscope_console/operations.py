@@ -196,6 +196,8 @@ class Operations:
             case orders.Investigate():
                 return await self._investigate(order)
             case orders.Consent():
+                if order.go:
+                    self._require_rest()
                 # Another hand is no hand for it.
                 self._consented = client
                 return self.investigations.answer(order.question, order.go)

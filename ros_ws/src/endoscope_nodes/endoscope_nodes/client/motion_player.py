@@ -84,8 +84,9 @@ class MotionPlayer:
                     # Nobody knows how long that takes: it is no part of the recording.
                     self._until_enabled()
                 self._recording(bag, after)
-                if client.state != 'ENABLED':
+                if not self._hold_to_play:
                     client.ask_and_see('enable', PATIENCE_S)
+                self._require_enabled()
                 self._played(motion, file)
             except BaseException:
                 if client.state == 'ENABLED':
