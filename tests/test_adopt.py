@@ -4,17 +4,29 @@ import json
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 from operated_graph import OperatedGraph
 
+from endoscope_bags import open_bag
 from endoscope_core.physics import EffectSpec, PlantDescription, save_plant
-from endoscope_nodes.names import JOINTS, SLAVE_MEASURED
+from endoscope_nodes.client.plant_adoption import AdoptionRequest, PlantInForce
+from endoscope_nodes.names import (
+    COMPENSATOR_ADOPT,
+    COMPENSATOR_PLANT,
+    JOINTS,
+    SLAVE_MEASURED,
+)
+from endoscope_nodes.runtime.qos import EVENT, RESULT
 
+STOPS = tuple(
+    EffectSpec('joint_stop', joint, {'angle_rad': 0.1, 'stiffness': 0.5}) for joint in JOINTS
+)
 EFFECTS = tuple(EffectSpec('gear_backlash', joint, {'gap_rad': 0.3}) for joint in JOINTS)
 
 
 @pytest.fixture
 def plants(tmp_path):
-    for name, effects in (('described', ()), ('true', EFFECTS)):
+    for name, effects in (('described', ()), ('true', EFFECTS), ('stiff', STOPS)):
         save_plant(PlantDescription(effects=effects), tmp_path / f'{name}.yaml')
     return tmp_path
 
@@ -68,3 +80,45 @@ def test_the_true_plant_is_adopted_and_undone(plants):
         assert status == 0, out + errors
         again = error_of_a_motion(graph)
         assert again == pytest.approx(before, rel=0.3)
+
+
+def test_a_bag_over_an_adoption_has_both_plants(plants):
+    with OperatedGraph(plants) as graph:
+        graph.enable()
+        for words in (
+            ('operate', 'adopt', str(plants / 'described.yaml')),
+            ('operate', 'record', 'start'),
+            ('operate', 'adopt', str(plants / 'true.yaml')),
+            ('operate', 'record', 'stop'),
+        ):
+            status, out, errors = graph.run(*words)
+            assert status == 0, out + errors
+    bag = open_bag(plants / 'bag')
+    decoded = bag.decoded(bag.find(COMPENSATOR_PLANT))
+    told = [PlantInForce.of_message(message) for _, message in decoded]
+    texts = [(plants / f'{name}.yaml').read_text() for name in ('described', 'true')]
+    assert list(dict.fromkeys(each.plant for each in told)) == texts
+    assert told[-1].before == told[0].hash
+
+
+def test_strangers_narrow_plants_and_faults_are_refused(plants):
+    told = []
+    with OperatedGraph(plants) as graph:
+        graph.probe.create_subscription(DiagnosticArray, COMPENSATOR_PLANT, told.append, RESULT)
+        graph.enable()
+        graph.set('console', source='motion', motion='non_periodic')
+        graph.advance(2.0)
+        graph.set('console', source='none')
+        graph.advance(0.6)
+        assert refused(graph, plants / 'stiff.yaml') == 'beyond_range'
+        graph.advance(0.2)
+        stranger = graph.speak(DiagnosticArray, COMPENSATOR_ADOPT, EVENT)
+        text = (plants / 'true.yaml').read_text()
+        stranger.publish(AdoptionRequest('1', text, 'of_somebody').message(graph.clock.now_ns))
+        graph.advance(0.2)
+        assert PlantInForce.of_message(told[-1]).code == 'other_session'
+        assert refused(graph, plants / 'true.yaml') == 'other_sender'
+        graph.probe.destroy_publisher(stranger)
+        graph.nodes['compensator']._session.leave('the test ends it')  # noqa: SLF001
+        graph.advance(0.3)
+        assert refused(graph, plants / 'true.yaml') == 'fault'

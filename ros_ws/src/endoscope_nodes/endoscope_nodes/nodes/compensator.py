@@ -176,7 +176,9 @@ class CompensatorNode(EndoscopeNode):
         before = self._angle if self._source == names.MASTER_NODE else bending
         joint = None if plant is None else plant.outside(before)
         if plant is not None and joint is not None:
-            within = ranges_in_words(plant.ranges[joint : joint + 1], names.JOINTS[joint:])
+            within = ranges_in_words(
+                plant.ranges[joint : joint + 1], names.JOINTS[joint : joint + 1]
+            )
             raise AdoptionError(
                 AdoptionCode.BEYOND_RANGE,
                 f'{names.JOINTS[joint]} is at {np.degrees(before[joint]):.0f} deg; {within}',
