@@ -4,7 +4,7 @@ import json
 import re
 
 import pytest
-from browsed_console import BrowsedConsole, grip, hold, shows, take
+from browsed_console import BrowsedConsole, grip, hold, shows, take, until
 from chromium import chromium
 from playwright.sync_api import expect
 
@@ -67,7 +67,18 @@ def test_an_investigation_asks_plays_under_the_hand_and_stops(running, page):
     expect(page.locator('#report iframe')).to_be_visible()
     assert running.moved(begin) == 0.0
 
-    card(page).get_by_role('button', name='Continue').click()
+    go_on = card(page).get_by_role('button', name='Continue')
+
+    def may_go_on():
+        # A machine that stood still for 2 s has lost him the controls.
+        if page.locator('#operator').inner_text() != 'you':
+            page.click('#tab-operate')
+            take(page)
+            page.click('#tab-explain')
+        return go_on.is_enabled()
+
+    until(page, may_go_on, 'Continue')
+    go_on.click()
     expect(dialog).to_be_visible()
     page.click('#consent [value=go]')
     expect(page.locator('#tab-operate')).to_have_attribute('aria-selected', 'true')
