@@ -149,7 +149,13 @@ def test_a_rig_as_described_is_explained_by_one_motion(tmp_path, capfd):
     assert only['answer']['names'] == []
     assert only['answer']['improved'] <= only['answer']['described']
     assert (out / 'plant.yaml').exists()
-    assert 'Commissioning of bend_x and bend_y' in (out / 'index.html').read_text()
+    html = (out / 'index.html').read_text()
+    assert 'Commissioning of bend_x and bend_y' in html
+    # The described plant is as good as the improved one.
+    described, improved = (each['rmse_deg'] for each in log['tracking'])
+    assert [each['by'] for each in log['tracking']] == ['described', 'improved']
+    assert improved == pytest.approx(described, rel=0.3)
+    assert f'off by {described:.2g} deg' in html
     # It is at its end, and says so.
     assert cli.main([*words, '--out', str(out)]) == 2
     assert 'at its end' in capfd.readouterr().err

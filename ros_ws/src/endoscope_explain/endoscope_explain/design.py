@@ -5,7 +5,7 @@ family of safe motions (Hunter, Reiner, Technometrics 7, 1965; Chen, Asprey, Ind
 42, 2003).
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
 
@@ -131,6 +131,8 @@ def as_played(time: Array, angle: Array, rig: Rig) -> tuple[Array, Array]:
 
 
 MOST_RIVALS = 3
+NUMBERS = 'other numbers'
+"""What a plant is called that has no effect more, but other numbers than were described."""
 MARGIN = 1.15
 """How far a proposed motion may go beyond the tensions and angles that were recorded."""
 SURE = 1.96
@@ -250,11 +252,50 @@ def propose(
         for rival in effect.alternatives[: MOST_RIVALS - 1]
         if (fitted := rival_plant(recording, plant, effect, rival)) is not None
     }
+    form = effect.evidence.get('form', 0.0)
+    return _separating(recording, plants, effect.joint, jobs, played, left, form)
+
+
+def propose_beside_numbers(
+    recording: Recording,
+    plant: PlantDescription,
+    described: PlantDescription,
+    joint: str,
+    effects: Sequence[str],
+    jobs: int = 1,
+    played: Played = (),
+    left: float = 1.0,
+) -> NextExperiment | None:
+    """Propose the motion that tells other numbers of a joint, which `plant` has, from effects.
+
+    With an effect the joint has about the numbers that were `described`. None as in `propose`.
+    """
+    bare = replace(plant, joints={**plant.joints, joint: described.joints[joint]})
+    there = {e.id for e in plant.effects if e.joint == joint}
+    rivals = [e for e in effects if e in KNOWN and e not in there]
+    plants = {NUMBERS: plant} | {
+        rival: fitted
+        for rival in rivals[: MOST_RIVALS - 1]
+        if (fitted := _with_effect(recording, bare, joint, rival)) is not None
+    }
+    return _separating(recording, plants, joint, jobs, played, left)
+
+
+def _separating(
+    recording: Recording,
+    plants: Mapping[str, PlantDescription],
+    joint: str,
+    jobs: int,
+    played: Played,
+    left: float,
+    form: float = 0.0,
+) -> NextExperiment | None:
+    """The motion of a joint that separates plants best, by their names; None as in `propose`."""
     if len(plants) < 2:
         return None
     motions = [
         motion
-        for motion in safe_family(recording, list(plants.values()), effect.joint)
+        for motion in safe_family(recording, list(plants.values()), joint)
         if (motion.name, motion.joint) not in played
     ]
     if not motions:
@@ -264,16 +305,14 @@ def propose(
         imagined = {name: imagine(p, waveform, recording.rig) for name, p in plants.items()}
         if recording.tension is None:
             imagined = {name: replace(r, tension=None) for name, r in imagined.items()}
-        missed = [
-            left_over(imagined[a], plants[b], effect.joint) for a, b in permutations(plants, 2)
-        ]
+        missed = [left_over(imagined[a], plants[b], joint) for a, b in permutations(plants, 2)]
         nats = min(0.5 * float(np.sum(each**2)) for each in missed)
         return min(float(np.sqrt(np.mean(each**2))) for each in missed), nats
 
     found = parallel_map(smallest, motions, jobs)
     best = int(np.argmax([apart for apart, _ in found]))
     apart, nats = found[best]
-    if not tells_apart(nats / max(left, 1.0) ** 2, effect.evidence.get('form', 0.0)):
+    if not tells_apart(nats / max(left, 1.0) ** 2, form):
         return None
     rivals = ' and '.join(plants)
     return _experiment(
@@ -381,7 +420,14 @@ def rival_plant(
     others = tuple(e for e in plant.effects if (e.id, e.joint) != (effect.id, effect.joint))
     places = (effect.id, *effect.definition.traits.families)
     bare = without_functions(replace(plant, effects=others), effect.joint, places)
-    observation = next(o for o in observe(recording, bare) if o.joint == effect.joint)
+    return _with_effect(recording, bare, effect.joint, rival)
+
+
+def _with_effect(
+    recording: Recording, bare: PlantDescription, joint: str, rival: str
+) -> PlantDescription | None:
+    """Fit an effect that a plant has not; None where nothing of it shows."""
+    observation = next(o for o in observe(recording, bare) if o.joint == joint)
     behind = background(refit(bare, observation, 0.2, 2))
     terms = tuple(Term(describe(rival), start) for start in starting_points(describe(rival)))
     ways = directions(behind, terms, 1)
@@ -390,8 +436,8 @@ def rival_plant(
     # Beside numbers that are bent by what was taken out, a rival may gain nothing at its starts.
     ranked = screened(behind, ways) or [ways[0].term]
     packed = ranked[0].added_to(behind.fit.model).base
-    term = replace(bare, effects=(*others, spec_of(describe(rival), effect.joint, packed)))
-    return with_fit(term, effect.joint, refit(term, observation, 0.2, 6))
+    term = replace(bare, effects=(*bare.effects, spec_of(describe(rival), joint, packed)))
+    return with_fit(term, joint, refit(term, observation, 0.2, 6))
 
 
 def safe_family(

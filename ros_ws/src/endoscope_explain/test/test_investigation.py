@@ -13,6 +13,7 @@ from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import hold, move, sequence
 from endoscope_core.signals.command_file import JOINTS, CommandTable, read_command_file
 from endoscope_explain.audit import audit_recording
+from endoscope_explain.explanation import Verdict
 from endoscope_explain.investigation.investigation import (
     Investigation,
     investigate,
@@ -124,6 +125,9 @@ def test_no_more_motions_are_asked_for_than_are_wanted(both, stribeck_case):
     assert log.rounds[0].motion == 'commissioning'
     assert len(log.rounds) == 2
     assert 'viscous_friction' in log.words
+    times = (both.folder / LOG_MD).read_text().split('## Times')[1]
+    assert times.count('explaining') == 2
+    assert log.rounds[0].proposed_s > 0.0
     # More of them continue it.
     again = investigate(
         dataclasses.replace(both, experiments=2), no_rig, lambda bags: stribeck_case
@@ -170,6 +174,34 @@ def test_ctrl_c_loses_nothing(both, stribeck_case):
     assert kept['stopped'] == 'interrupted'
     assert kept['rounds'][0]['answer']['names'][0]['id'] == 'stribeck_friction'
     assert kept['rounds'][1]['ended']
+
+
+def test_numbers_that_an_effect_may_stand_for_are_asked_about(both, told):
+    instead = {'bend_x': ('gravity', 'load_of_angle')}
+    found = {'effects': (), 'verdict': Verdict.PARAMETERS_DIFFER}
+    explanation = dataclasses.replace(told.explanation, instead=instead, **found)
+    left_open = dataclasses.replace(told, explanation=explanation, **found)
+    log = investigate(both, no_rig, lambda bags: left_open)
+    (name,) = log.last_answer.names
+    assert (name.id, name.joint, name.rivals) == ('other numbers', 'bend_x', instead['bend_x'])
+    assert log.stopped is not Stop.ONE_CLASS
+
+
+def test_a_comparison_that_nobody_wants_leaves_what_is_known(both, told):
+    asked = []
+
+    def declined(motion, file, bag, plant):
+        asked.append((motion.words, file.name, plant))
+        raise NotPlayedError('the motion was not wanted')
+
+    log = investigate(both, no_rig, lambda bags: told, track=declined)
+    assert log.stopped is Stop.ONE_CLASS
+    assert log.untracked == 'the motion was not wanted'
+    ((words, file, plant),) = asked
+    assert file == 'held_out.csv'
+    assert 'Held-out motion of bend_x and bend_y, 16 s' in words
+    assert plant == both.plant_file.read_text()
+    assert 'not measured: the motion was not wanted' in (both.folder / LOG_MD).read_text()
 
 
 def test_a_motion_that_nobody_wants_is_not_played(both, told):

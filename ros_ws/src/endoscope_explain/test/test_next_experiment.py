@@ -5,7 +5,15 @@ import pytest
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.rig import shipped_rig
-from endoscope_explain.design import distance, family, imagine, is_safe, propose
+from endoscope_explain.design import (
+    NUMBERS,
+    distance,
+    family,
+    imagine,
+    is_safe,
+    propose,
+    propose_beside_numbers,
+)
 from endoscope_explain.explanation import NamedEffect
 
 PLANT = PlantDescription()
@@ -86,3 +94,13 @@ def test_a_rival_that_is_there_besides_is_none(record):
     lag = EffectSpec('actuator_lag', 'bend_x', {'time_constant_s': 0.02})
     plant = dataclasses.replace(PLANT, effects=(late, lag))
     assert propose(record(plant, duration=8.0), plant, RIVALLED) is None
+
+
+def test_other_numbers_are_a_rival_of_an_effect(record):
+    recording = record(with_effect('transport_delay', delay_s=0.03), duration=6.0)
+    joint = dataclasses.replace(PLANT.joints['bend_x'], joint_friction=0.02)
+    others = dataclasses.replace(PLANT, joints={**PLANT.joints, 'bend_x': joint})
+    proposed = propose_beside_numbers(recording, others, PLANT, 'bend_x', ('transport_delay',))
+    assert proposed.separates == (NUMBERS, 'transport_delay')
+    # A function at a place has no formula to simulate it by.
+    assert propose_beside_numbers(recording, others, PLANT, 'bend_x', ('load_of_angle',)) is None

@@ -45,7 +45,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         type=within(0, 100, int),
         default=4,
         metavar='N',
-        help='motions after the commissioning motion at most (default 4)',
+        help='at most so many motions after the commissioning motion, which is not counted '
+        '(default 4)',
     )
     parser.add_argument(
         '--attended',
@@ -93,6 +94,7 @@ def run(args: argparse.Namespace) -> int:
         investigate,
     )
     from endoscope_explain.investigation.log import PAGE, Log, Stop, begun
+    from endoscope_explain.investigation.tracking import PlayThrough
     from endoscope_nodes.client.motion_player import MotionPlayer
 
     if not (args.attended or args.lines or sys.stdin.isatty()):
@@ -102,11 +104,14 @@ def run(args: argparse.Namespace) -> int:
     begun(of.folder, of.plant_file)
     step = partial(print, file=sys.stderr, flush=True)
 
-    def investigated(play: Play, say: Callable[[str], None]) -> Log:
+    def investigated(
+        play: Play, say: Callable[[str], None], track: PlayThrough | None = None
+    ) -> Log:
         return investigate(
             of,
             play,
             lambda bags: explain_together(bags, of, step),
+            track=track,
             page=lambda log: page.page(log, of.folder),
             say=say,
         )
@@ -118,7 +123,8 @@ def run(args: argparse.Namespace) -> int:
     say = partial(print, flush=True)
     consent = (lambda words: True) if args.attended else _asked
     with _graph(args, rig) as client, paused_when_interrupted(client, moving=True):
-        log = investigated(MotionPlayer(client, consent).play, say)
+        player = MotionPlayer(client, consent)
+        log = investigated(player.play, say, player.play)
     say(f'Page: {of.folder / PAGE}')
     return 1 if log.stopped in (Stop.FAULT, Stop.INTERRUPTED) else 0
 

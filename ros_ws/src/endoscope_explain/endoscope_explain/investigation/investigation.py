@@ -16,7 +16,7 @@ from endoscope_core.physics.plant_file import load_plant, save_plant
 from endoscope_core.rig import Rig
 from endoscope_core.signals.command_file import JOINTS, write_command_file
 from endoscope_explain.case import ExplainedCase, NextExperiment
-from endoscope_explain.design import is_wide, narrow, propose
+from endoscope_explain.design import NUMBERS, is_wide, narrow, propose, propose_beside_numbers
 from endoscope_explain.explanation import NamedEffect
 from endoscope_explain.investigation import log as logs
 from endoscope_explain.investigation.log import Answer, Log, Name, Round, Stop
@@ -26,6 +26,7 @@ from endoscope_explain.investigation.motions import (
     of_experiment,
     require_allowed,
 )
+from endoscope_explain.investigation.tracking import PlayThrough, held_out, with_tracking
 from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
 from endoscope_explain.report.numbers import shown
 from endoscope_explain.report.sentences import verdict_sentence
@@ -70,10 +71,14 @@ def investigate(
     play: Play,
     explain: Explain,
     *,
+    track: PlayThrough | None = None,
     page: Page | None = None,
     say: Callable[[str], None] = lambda _: None,
 ) -> Log:
     """Ask a rig for motions until it is explained; continue where a folder's log has ended.
+
+    With `track` a motion that is among no experiments then shows what the improved plant is good
+    for.
 
     What is known is in the folder after every step. Interruption and a fault of the rig end it with
     that; Ctrl-C is raised again afterwards, and so is an error of `explain`.
@@ -90,6 +95,9 @@ def investigate(
             running.record(motion, play)
             motion = running.answered(explain)
         running.end(motion, running.why_enough(motion))
+        answer = running.log.last_answer
+        if track is not None and answer is not None and answer.improved is not None:
+            running.follow(track)
     except RigStoppedError as error:
         running.end(Stop.FAULT, str(error))
     except NotPlayedError as error:
@@ -133,8 +141,9 @@ class _Running:
         write_command_file(file, motion.table.time, motion.table.angle, JOINTS)
         self.keep(replace(self.log, rounds=(*self.log.rounds, asked)))
         self.say(f'{number}. {motion.words}. {motion.why}')
+        began = time.monotonic()
         play(motion, file, self.of.folder / asked.bag)
-        self.keep(self.log.with_last(recorded=True))
+        self.keep(self.log.with_last(recorded=True, played_s=time.monotonic() - began))
 
     def answered(self, explain: Explain) -> Motion | Stop:
         """Explain all recordings together, and say what to ask next, or why nothing."""
@@ -143,19 +152,27 @@ class _Running:
         case = explain([self.of.folder / each.bag for each in whole])
         save_plant(case.plant, self.of.folder / logs.PLANT)
         found = answer_of(case, time.monotonic() - began)
-        last = whole[-1]
-        rounds = (replace(r, answer=found) if r is last else r for r in self.log.rounds)
-        self.keep(replace(self.log, rounds=tuple(rounds)))
+        self.keep(self.log.with_whole(answer=found))
         for line in logs.answered(found):
             self.say(line)
-        if not _asks_more(case.effects):
+        if not _asks_more(case):
             return Stop.ONE_CLASS
         if len(whole) > self.of.experiments:
             return Stop.USED_UP
         self.say('looking for the motion that tells more')
+        began = time.monotonic()
         played = {(each.motion, each.joint) for each in whole}
         proposed = _proposed(case, self.of.jobs, played)
+        self.keep(self.log.with_whole(proposed_s=time.monotonic() - began))
         return Stop.NOTHING_TO_GAIN if proposed is None else of_experiment(proposed)
+
+    def follow(self, track: PlayThrough) -> None:
+        """See how the tip follows by the described and by the improved plant."""
+        of = self.of
+        motion = held_out(of.plant, of.rig)
+        self.say(f'{motion.words}, by the described plant and by the improved one. {motion.why}')
+        self.keep(with_tracking(self.log, of.folder, of.plant_file, motion, of.rig, track))
+        self.say(logs.tracking(self.log))
 
     def why_enough(self, stop: Stop) -> str:
         """Say why no further motion is asked for."""
@@ -178,6 +195,8 @@ class _Running:
             log = log.with_last(ended=sentence)
         self.keep(log.ended(stop, sentence))
         self.say(sentence)
+        for line in logs.times(self.log):
+            self.say(line)
 
 
 def answer_of(case: ExplainedCase, seconds: float) -> Answer:
@@ -187,8 +206,12 @@ def answer_of(case: ExplainedCase, seconds: float) -> Answer:
         max((each.ratio for each in fit[name].values()), default=None) if name in fit else None
         for name in ('nominal', 'augmented')
     ]
-    names = tuple(Name(e.id, e.joint, e.alternatives, _strength(e)) for e in case.effects)
-    return Answer(str(case.verdict), verdict_sentence(case), names, worst[0], worst[1], seconds)
+    names = [Name(e.id, e.joint, e.alternatives, _strength(e)) for e in case.effects]
+    names += [
+        Name(NUMBERS, joint, rivals, '') for joint, rivals in case.explanation.instead.items()
+    ]
+    sentence = verdict_sentence(case)
+    return Answer(str(case.verdict), sentence, tuple(names), worst[0], worst[1], seconds)
 
 
 def _strength(effect: NamedEffect) -> str:
@@ -196,8 +219,9 @@ def _strength(effect: NamedEffect) -> str:
     return str(shown(first, effect.parameters[first])) if first in effect.parameters else ''
 
 
-def _asks_more(names: Sequence[NamedEffect]) -> bool:
-    return any(is_wide(e) or any(a in KNOWN for a in e.alternatives) for e in names)
+def _asks_more(case: ExplainedCase) -> bool:
+    rivals = [e.alternatives for e in case.effects] + list(case.explanation.instead.values())
+    return any(map(is_wide, case.effects)) or any(a in KNOWN for each in rivals for a in each)
 
 
 def _proposed(
@@ -210,6 +234,13 @@ def _proposed(
     left = _left(case)
     for effect in known:
         found = propose(recording, plant, effect, jobs, played, left)
+        if found is not None:
+            return found
+    described = case.explanation.nominal
+    for joint, effects in case.explanation.instead.items():
+        found = propose_beside_numbers(
+            recording, plant, described, joint, effects, jobs, played, left
+        )
         if found is not None:
             return found
     for effect in filter(is_wide, known):

@@ -74,6 +74,18 @@ class Round:
     recorded: bool = False  # whole, from begin to end
     ended: str = ''  # why it is not whole
     answer: Answer | None = None
+    # Until the motion was recorded, consent included, and then to find the next one.
+    played_s: float = 0.0
+    proposed_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """How well the tip followed a motion that is among no experiments."""
+
+    by: str  # plant that the compensator inverted
+    bag: str  # its folder, in the folder
+    rmse_deg: float  # over both joints
 
 
 @dataclass(frozen=True)
@@ -86,6 +98,8 @@ class Log:
     rounds: tuple[Round, ...] = ()
     stopped: Stop | None = None
     words: str = ''  # why, in a sentence
+    tracking: tuple[Tracking, ...] = ()  # by the described and by the improved plant
+    untracked: str = ''  # why it was not measured
 
     @property
     def whole(self) -> tuple[Round, ...]:
@@ -104,6 +118,12 @@ class Log:
             self,
             rounds=(*self.rounds[:-1], replace(self.rounds[-1], **changed)),  # type: ignore[arg-type]
         )
+
+    def with_whole(self, **changed: object) -> 'Log':
+        """The log with the last of its rounds that are whole changed."""
+        last = self.whole[-1]
+        rounds = (replace(r, **changed) if r is last else r for r in self.rounds)  # type: ignore[arg-type]
+        return replace(self, rounds=tuple(rounds))
 
     def ended(self, stop: Stop, words: str) -> 'Log':
         """The log with why it ends."""
@@ -166,9 +186,11 @@ class _Kept:
     rounds: tuple[Round, ...] = ()
     stopped: None = None
     words: str = ''
+    tracking: tuple[Tracking, ...] = ()
+    untracked: str = ''
 
     def log(self) -> Log:
-        return Log(self.schema, self.plant, self.plant_sha256, self.rounds, None, self.words)
+        return Log(**vars(self))
 
 
 def in_sentences(log: Log) -> list[str]:
@@ -181,7 +203,34 @@ def in_sentences(log: Log) -> list[str]:
             lines += ['', *(f'- {line}' for line in answered(each.answer))]
     if log.stopped is not None:
         lines += ['', '## End', '', log.words]
+    if said := tracking(log):
+        lines += ['', '## Tracking', '', said]
+    lines += ['', '## Times', '', *times(log)] if log.whole else []
     return lines
+
+
+def tracking(log: Log) -> str:
+    """How the tip follows, in a sentence; empty where nobody has tried."""
+    if log.untracked:
+        return f'Tracking was not measured: {log.untracked.rstrip(".")}.'
+    if not log.tracking:
+        return ''
+    described, improved = (each.rmse_deg for each in log.tracking)
+    return (
+        'On a motion that is among no experiments the tip is off by '
+        f'{described:.2g} deg (rms) where the described plant is inverted, '
+        f'and by {improved:.2g} deg where the improved one is.'
+    )
+
+
+def times(log: Log) -> list[str]:
+    """How long each round took, by its stages."""
+    return [
+        f'{number}. motion {each.played_s:.0f} s, explaining '
+        f'{each.answer.seconds if each.answer else 0.0:.0f} s, next motion {each.proposed_s:.0f} s'
+        for number, each in enumerate(log.rounds, 1)
+        if each.recorded
+    ]
 
 
 def asked(each: Round) -> str:

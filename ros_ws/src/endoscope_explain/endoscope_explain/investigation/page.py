@@ -5,7 +5,16 @@ from pathlib import Path
 import numpy as np
 
 from endoscope_core.signals.command_file import JOINTS, read_command_file
-from endoscope_explain.investigation.log import Answer, Log, answered, asked, recorded
+from endoscope_explain.investigation.log import (
+    Answer,
+    Log,
+    answered,
+    asked,
+    recorded,
+    times,
+    tracking,
+)
+from endoscope_explain.investigation.tracking import tracked
 from endoscope_pages import Curve, Plot, figure_html, html_table, render_page
 
 COLOURS = ('actual', 'wanted')
@@ -35,6 +44,9 @@ def page(log: Log, folder: Path) -> str:
             }
             for each in log.rounds
         ],
+        tracking=tracking(log),
+        tracking_figure=_tracking(log, folder) if log.tracking else '',
+        times=times(log),
     )
 
 
@@ -54,3 +66,18 @@ def _figure(file: Path) -> str:
         if table.angle[:, k].any()
     )
     return figure_html((Plot('Desired angle (deg)', 'time (s)', curves, height=110),))
+
+
+def _tracking(log: Log, folder: Path) -> str:
+    """What was asked for, and what the tip did by either plant, a plot a joint."""
+    of = {each.by: tracked(folder / each.bag) for each in log.tracking}
+    plots = []
+    for k, joint in enumerate(JOINTS):
+        wanted = next(iter(of.values()))
+        curves = [Curve('desired', wanted.time, np.degrees(wanted.desired[:, k]), 'wanted')]
+        curves += [
+            Curve(f'by the {by} plant', one.time, np.degrees(one.tip[:, k]), colour)
+            for (by, one), colour in zip(of.items(), ('curve-2', 'curve-1'), strict=True)
+        ]
+        plots.append(Plot(f'{joint} (deg)', 'time (s)', tuple(curves), height=150))
+    return figure_html(tuple(plots))

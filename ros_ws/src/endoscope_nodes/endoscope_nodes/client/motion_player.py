@@ -1,16 +1,22 @@
 """Plays a motion on a running graph, with the operator's consent, and records it."""
 
 import math
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
+from sensor_msgs.msg import Joy
+
+from endoscope_core.choices import BY_ADOPTED
 from endoscope_core.errors import NotPlayedError, OutputError, RigStoppedError
 from endoscope_nodes import names
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import MASTER, RECORDER, GraphError
 from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
+from endoscope_nodes.client.handle_sender import clutch_message
+from endoscope_nodes.client.plant_adoption import AdoptedPlants, RefusedAdoptionError
+from endoscope_nodes.runtime.qos import EVENT
 
 RECORDER_NODE = 'recorder'
 PATIENCE_S = 20.0
@@ -18,7 +24,11 @@ NEXT_WORD_S = 1.5
 """The console says once a second how far it is; a word from before means nothing."""
 REST_S = 0.5
 """After a motion, so that what it leaves behind is recorded."""
-AS_COMMANDED = (('compensator', {'mode': 'none'}), ('controller', {'active': False}))
+COMPENSATOR = 'compensator'
+AS_COMMANDED = (
+    (COMPENSATOR, {'mode': 'none', 'selected_by': ''}),
+    ('controller', {'active': False}),
+)
 """The motors do what the motion asks: the plant's answer to that was found to be safe."""
 
 Consent = Callable[[str], bool]
@@ -43,8 +53,9 @@ class MotionPlayer:
     """Plays motions one at a time, each in a motion session of its own.
 
     A session is opened for a motion that somebody consents to, and ends with it. Whatever ends a
-    motion before its end pauses the graph. With `hold_to_play` a person enables the slave, and the
-    motion goes on only while the clutch is held. What is `withdrawn` after consent is not played.
+    motion before its end pauses the graph. The motion goes on only while the clutch is held: by the
+    player, so that nothing moves on once its program is gone, or with `hold_to_play` by a person,
+    who enables the slave, too. What is `withdrawn` after consent is not played.
     """
 
     def __init__(
@@ -60,12 +71,16 @@ class MotionPlayer:
         self._hold_to_play = hold_to_play
         self._withdrawn = withdrawn
         self.prepares = False  # between consent and the moment in which a person may enable
+        self._tries = False  # whether a plant is in force that was given for one motion
 
-    def play(self, motion: PlayedMotion, file: Path, bag: Path) -> None:
+    def play(self, motion: PlayedMotion, file: Path, bag: Path, plant: str = '') -> None:
         """Play a motion, which a file holds, and record it to a bag that does not exist.
 
-        RigStoppedError if the rig stops on the way, NotPlayedError if nobody consents or a person
-        ends it, GraphError if the graph does not do what it is asked for.
+        With the text of a plant file the compensator inverts that plant meanwhile; what was in
+        force before is so again afterwards.
+
+        RigStoppedError if the rig stops on the way, NotPlayedError if nobody consents, a person
+        ends it or the plant is refused, GraphError if the graph does not do what it is asked for.
         """
         client = self._client
         self._look()
@@ -87,7 +102,10 @@ class MotionPlayer:
                 if not self._hold_to_play:
                     client.ask_and_see('enable', PATIENCE_S)
                 self._require_enabled()
-                self._played(motion, file)
+                if plant:
+                    self._through(plant, lambda: self._played(motion, file))
+                else:
+                    self._played(motion, file)
             except BaseException:
                 if client.state == 'ENABLED':
                     client.order('pause')
@@ -109,7 +127,7 @@ class MotionPlayer:
 
     def _as_commanded(self, after: ExitStack) -> None:
         """Let nothing add to the motion, until `after`."""
-        silent = {'source': 'none', 'hold_to_play': self._hold_to_play, 'command_file': ''}
+        silent = {'source': 'none', 'hold_to_play': True, 'command_file': ''}
         for node, values in (*AS_COMMANDED, (names.MASTER_NODE, silent)):
             before = {
                 name: read_parameter(self._client, f'{node}.{name}', PATIENCE_S).value
@@ -118,9 +136,29 @@ class MotionPlayer:
             # Nothing begins to move by itself once the session is over.
             if node == names.MASTER_NODE and before['source'] in ('motion', 'file'):
                 before['source'] = 'none'
-            after.callback(set_parameters, self._client, node, before)
+            after.callback(self._as_before, node, before)
             given: dict[str, Any] = {k: v for k, v in values.items() if v != ''}
             set_parameters(self._client, node, given)
+
+    def _as_before(self, node: str, before: dict[str, Any]) -> None:
+        # The plant of before cannot be put into force again where no session is open any more.
+        lost = node == COMPENSATOR and self._tries and before['selected_by'] == BY_ADOPTED
+        set_parameters(self._client, node, {**before, 'mode': 'none'} if lost else before)
+
+    def _through(self, plant: str, played: Callable[[], None]) -> None:
+        """Do something while the compensator inverts a plant."""
+        plants = AdoptedPlants(self._client)
+        try:
+            self._session()
+            plants.adopt(plant, PATIENCE_S)
+            self._tries = True
+            played()
+            plants.adopt('', PATIENCE_S)
+            self._tries = False
+        except RefusedAdoptionError as error:
+            raise NotPlayedError(f'the compensator does not take the plant: {error}') from error
+        finally:
+            plants.leave()
 
     def _until_enabled(self) -> None:
         client = self._client
@@ -142,8 +180,23 @@ class MotionPlayer:
         client.trigger(names.RECORDER_START, PATIENCE_S)
         after.callback(client.trigger, names.RECORDER_STOP, PATIENCE_S)
 
+    @contextmanager
+    def _clutch(self) -> Iterator[Callable[[], None]]:
+        """What holds the clutch a little longer, unless a person does."""
+        if self._hold_to_play:
+            yield lambda: None
+            return
+        client = self._client
+        publisher = client.node.create_publisher(Joy, names.MASTER_CLUTCH, EVENT)
+        try:
+            yield lambda: publisher.publish(clutch_message(True, client.graph_ns))
+        finally:
+            publisher.publish(clutch_message(False, client.graph_ns))
+            client.node.destroy_publisher(publisher)
+
     def _played(self, motion: PlayedMotion, file: Path) -> None:
         client = self._client
+        session = self._session()
         path = str(file.absolute())
         set_parameters(client, names.MASTER_NODE, {'command_file': path, 'source': 'file'})
         asked_ns = client.graph_ns
@@ -154,17 +207,33 @@ class MotionPlayer:
             return heard and client.graph_ns > asked_ns + round(NEXT_WORD_S * 1e9)
 
         patience_s = math.inf if self._hold_to_play else motion.duration + PATIENCE_S
-        client.wait_until(
-            lambda: client.state != 'ENABLED' or is_at_its_end() or self._withdrawn(), patience_s
-        )
-        self._require_enabled()
-        if not is_at_its_end():
-            raise GraphError(f'the console did not play {file} to its end in {patience_s:.0f} s')
-        client.wait_until(lambda: client.state != 'ENABLED', REST_S)
-        self._require_enabled()
+        with self._clutch() as hold:
+
+            def has_ended() -> bool:
+                hold()
+                return not self._goes_on(session) or is_at_its_end()
+
+            client.wait_until(has_ended, patience_s)
+            self._require_enabled(session)
+            if not is_at_its_end():
+                raise GraphError(
+                    f'the console did not play {file} to its end in {patience_s:.0f} s'
+                )
+        client.wait_until(lambda: not self._goes_on(session), REST_S)
+        self._require_enabled(session)
         set_parameters(client, names.MASTER_NODE, {'source': 'none'})
 
-    def _require_enabled(self) -> None:
+    def _session(self) -> str:
+        """The motion session that has been opened, which is told a beat after the state."""
+        client = self._client
+        client.wait_until(lambda: bool(client.session) or client.state != 'ENABLED', PATIENCE_S)
+        return client.session
+
+    def _goes_on(self, session: str) -> bool:
+        client = self._client
+        return client.state == 'ENABLED' and client.session == session and not self._withdrawn()
+
+    def _require_enabled(self, session: str | None = None) -> None:
         client = self._client
         if client.state == 'FAULT':
             client.wait_until(lambda: bool(client.why), NEXT_WORD_S)
@@ -173,3 +242,5 @@ class MotionPlayer:
             raise NotPlayedError('a person ended it')
         if client.state != 'ENABLED':
             raise NotPlayedError(f'the slave is {client.state}: {client.why or "asked for"}')
+        if session is not None and client.session != session:
+            raise NotPlayedError('somebody else has opened another motion session')

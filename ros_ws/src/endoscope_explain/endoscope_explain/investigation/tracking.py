@@ -1,0 +1,102 @@
+"""How well the tip follows what is asked for, by the described and by the improved plant."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_bags import open_bag
+from endoscope_core.errors import NotPlayedError
+from endoscope_core.metrics import tracking_rmse
+from endoscope_core.physics.description import PlantDescription
+from endoscope_core.rig import Rig
+from endoscope_core.signals import non_periodic_signal
+from endoscope_core.signals.command_file import JOINTS, CommandTable, write_command_file
+from endoscope_explain.design import SAMPLE_S, as_played
+from endoscope_explain.investigation import log as logs
+from endoscope_explain.investigation.log import Log, Tracking
+from endoscope_explain.investigation.motions import Motion, commissioning, require_allowed
+from endoscope_explain.recording import BENDING, DESIRED
+
+Array = NDArray[np.float64]
+
+HELD_OUT = 'held-out motion'
+FILE = 'held_out.csv'
+DURATION_S = 15.0
+SETTLED_S = 3.0
+"""From where on errors count: a plant that is adopted moves nothing, and what it changes is worked
+off while the desired angle moves."""
+SHARE = 0.5
+"""Of the largest angle of the commissioning motion: what compensation adds to it stays within what
+the rig has been through."""
+
+PlayThrough = Callable[[Motion, Path, Path, str], None]
+"""Plays a motion, which a file holds, through the inverse of a plant, and records it to a bag."""
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """A motion as it was asked for and as the tip made it."""
+
+    time: Array  # (N,), s
+    desired: Array  # (N, J), rad
+    tip: Array  # (N, J), rad
+
+    @property
+    def rmse(self) -> float:
+        """In rad, over all joints, once settled."""
+        settled = self.time >= SETTLED_S
+        return tracking_rmse(self.desired[settled], self.tip[settled])
+
+
+def held_out(plant: PlantDescription, rig: Rig) -> Motion:
+    """A motion of both joints that is among no experiments."""
+    first = commissioning(plant, rig)
+    signal = non_periodic_signal(DURATION_S)
+    time = np.arange(0.0, signal.duration, SAMPLE_S)
+    angle = np.asarray(signal(time)[0])
+    angle *= SHARE * first.largest / float(np.abs(angle).max())
+    columns = [angle if joint in plant.joints else 0.0 * angle for joint in JOINTS]
+    table = CommandTable(JOINTS, *as_played(time, np.stack(columns, axis=1), rig))
+    why = 'It is among no experiments: it shows what the improved plant is good for.'
+    return Motion(HELD_OUT, first.joint, why, table)
+
+
+def with_tracking(
+    log: Log, folder: Path, plant_file: Path, motion: Motion, rig: Rig, play: PlayThrough
+) -> Log:
+    """The log with how the tip follows a motion by the described and by the improved plant.
+
+    Where that was not wanted or refused, it says so. RigStoppedError if the rig stops on the way.
+    """
+    require_allowed(motion, rig)
+    write_command_file(folder / FILE, motion.table.time, motion.table.angle, JOINTS)
+    found: tuple[Tracking, ...] = ()
+    for by, file in (('described', plant_file), ('improved', folder / logs.PLANT)):
+        bag = f'tracking_{by}_{1 + sum(1 for _ in folder.glob(f"tracking_{by}_*"))}'
+        try:
+            play(motion, folder / FILE, folder / bag, file.read_text('utf-8'))
+        except NotPlayedError as error:
+            return replace(log, tracking=(), untracked=str(error))
+        rmse = math.degrees(tracked(folder / bag).rmse)
+        found = (*found, Tracking(by, bag, rmse))
+    return replace(log, tracking=found, untracked='')
+
+
+def tracked(bag: Path) -> Tracked:
+    """What a bag has of a motion: from its first to its last desired angle, where the tip is known.
+
+    BagError if it cannot be read.
+    """
+    opened = open_bag(bag)
+    desired = opened.joint_state(DESIRED).select(JOINTS)
+    tip = opened.joint_state(BENDING).select(JOINTS)
+    begin, end = desired.stamp_ns[0], desired.stamp_ns[-1]
+    inside = (tip.stamp_ns >= begin) & (tip.stamp_ns <= end)
+    time = 1e-9 * (tip.stamp_ns[inside] - begin)
+    asked = desired.require('position')
+    columns = [np.interp(time, 1e-9 * (desired.stamp_ns - begin), column) for column in asked.T]
+    return Tracked(time, np.stack(columns, axis=1), tip.require('position')[inside])

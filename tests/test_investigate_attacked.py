@@ -1,0 +1,141 @@
+"""While a motion is played for an investigation, nothing moves that nobody asked for.
+
+One graph for all, in simulated time; after every attack it is enabled anew and has to stand still.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from commanded_graph import STILL, Moved, Sender
+from operated_graph import OperatedGraph
+from sensor_msgs.msg import Joy
+
+from endoscope_core.errors import NotPlayedError, RigStoppedError
+from endoscope_core.signals import hold, move, sequence
+from endoscope_core.signals.command_file import JOINTS, CommandTable, write_command_file
+from endoscope_explain.investigation.motions import Motion
+from endoscope_nodes.client.graph_client import GraphClient
+from endoscope_nodes.client.graph_listener import GraphError
+from endoscope_nodes.client.motion_player import MotionPlayer
+from endoscope_nodes.names import MASTER_CLUTCH, SLAVE_COMMAND
+from endoscope_nodes.runtime.qos import EVENT
+
+UNDER_WAY = 0.2
+"""Shaft angle in rad at which the motion is under way."""
+STOPS_S = 0.6
+"""Until the last one has noticed: three missed words of the clutch, and the way to a standstill."""
+
+
+@pytest.fixture(scope='module')
+def graph(tmp_path_factory):
+    with OperatedGraph(tmp_path_factory.mktemp('attacked')) as graph:
+        yield graph
+
+
+@pytest.fixture(scope='module')
+def motion(tmp_path_factory):
+    signal = sequence('there and back', [move(0.0, 0.8, 2.0), move(0.8, 0.0, 2.0), hold(0.2)])
+    ticks = np.arange(0.0, signal.duration, 0.01)
+    angle = np.stack([signal(ticks)[0], np.zeros_like(ticks)], axis=1)
+    file = tmp_path_factory.mktemp('motion') / 'motion.csv'
+    write_command_file(file, ticks, angle)
+    return Motion('there and back', 'bend_x', '', CommandTable(JOINTS, ticks, angle)), file
+
+
+@pytest.fixture
+def strangers(graph):
+    """What strangers publish with, until the test is over."""
+    found = []
+    yield found
+    for publisher in found:
+        graph.probe.destroy_publisher(publisher)
+    graph.connect()
+
+
+class Attacked(GraphClient):
+    """A client beside whose waiting the graph goes on; something happens while a motion plays."""
+
+    def __init__(self, graph, happens, beside):
+        super().__init__(graph.probe, self._live, lambda: graph.clock.now_ns * 1e-9)
+        self._graph, self.happens, self._beside = graph, happens, beside
+
+    def _live(self, seconds):
+        graph = self._graph
+        self._beside(self)
+        graph.advance(seconds)
+        moving = graph.goals and abs(graph.goals[-1].position[0]) > UNDER_WAY
+        if self.happens is not None and self.state == 'ENABLED' and moving:
+            happens, self.happens = self.happens, None
+            happens()
+
+
+def attacked(graph, motion, folder, happens, beside=lambda client: None, **of_player):
+    """Play a motion during which something happens; how it ended."""
+    graph.command('disable')
+    graph.advance(0.5)
+    graph.goals.clear()
+    ended = None
+    with Attacked(graph, happens, beside) as client:
+        try:
+            MotionPlayer(client, lambda words: True, **of_player).play(*motion, folder / 'bag')
+        except (NotPlayedError, RigStoppedError, GraphError) as error:
+            ended = error
+    assert client.happens is None, ended
+    return ended
+
+
+def stands_still(graph):
+    """Whether nothing moves, in the session that is there and in a new one."""
+    graph.advance(STOPS_S)
+    moved = Moved(graph)
+    graph.advance(1.0)
+    before = moved.of_shafts
+    graph.command('disable')
+    graph.advance(0.5)
+    graph.enable()
+    moved.clear()
+    graph.advance(1.5)
+    now = moved.of_shafts
+    graph.command('disable')
+    return before < STILL and now < STILL
+
+
+def test_a_motion_that_nothing_happens_to_is_played_to_its_end(graph, motion, tmp_path):
+    assert attacked(graph, motion, tmp_path, lambda: None) is None
+    assert stands_still(graph)
+
+
+def stranger_commands(graph, strangers, position):
+    sender = Sender(graph, SLAVE_COMMAND)
+    strangers.append(sender.publisher)
+    for _ in range(5):
+        sender.send(position)
+        graph.advance(0.01)
+
+
+@pytest.mark.parametrize('position', [(0.5, 0.5), (math.nan, 0.0)])
+def test_a_stranger_who_commands_is_a_fault(graph, motion, tmp_path, strangers, position):
+    error = attacked(graph, motion, tmp_path, lambda: stranger_commands(graph, strangers, position))
+    assert isinstance(error, RigStoppedError)
+    assert 'senders' in str(error)
+    for publisher in strangers:
+        graph.probe.destroy_publisher(publisher)
+    strangers.clear()
+    graph.connect()
+    assert stands_still(graph)
+
+
+def test_a_stranger_at_the_clutch_is_a_fault(graph, motion, tmp_path, strangers):
+    def happens():
+        strangers.append(graph.speak(Joy, MASTER_CLUTCH, EVENT))
+        strangers[-1].publish(Joy(buttons=[1]))
+        graph.advance(0.05)
+
+    error = attacked(graph, motion, tmp_path, happens)
+    assert isinstance(error, (RigStoppedError, NotPlayedError)), error
+    for publisher in strangers:
+        graph.probe.destroy_publisher(publisher)
+    strangers.clear()
+    graph.connect()
+    assert stands_still(graph)
