@@ -10,11 +10,12 @@ from endoscope_bags import open_bag
 from endoscope_bringup import cli
 from endoscope_bringup.demo.live_graph import NODES, LiveGraph
 from endoscope_core.errors import NotPlayedError, RigStoppedError
-from endoscope_core.physics import PlantDescription, save_plant
+from endoscope_core.physics import EffectSpec, PlantDescription, save_plant
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import hold, move, sequence
 from endoscope_core.signals.command_file import JOINTS, CommandTable, write_command_file
 from endoscope_explain.investigation.motions import Motion
+from endoscope_explain.investigation.tracking import held_out, tracked
 from endoscope_nodes.client.graph_parameters import read_parameter
 from endoscope_nodes.client.motion_player import MotionPlayer
 from endoscope_nodes.names import SLAVE_COMMAND
@@ -35,9 +36,12 @@ def motion(tmp_path):
     return Motion('there and back', 'bend_x', '', CommandTable(JOINTS, time, angle)), file
 
 
-def graph(rig=None):
+def graph(rig=None, plant=None, folder=None):
     """All nodes in simulated time."""
     overrides = {'recorder': {'autostart': False}}
+    if plant is not None:
+        save_plant(plant, folder / 'slave.yaml')
+        overrides['motor_driver'] = {'plant_file': str(folder / 'slave.yaml')}
     return LiveGraph(
         None, lock_step=True, overrides=overrides, rig=rig, nodes=(*NODES, RecorderNode)
     )
@@ -63,6 +67,29 @@ def test_a_motion_is_played_in_a_session_of_its_own_and_leaves_everything_as_it_
     played = commands.require('position')
     assert played[:, 0].max() == pytest.approx(LARGEST, abs=0.01)
     assert np.abs(played[:, 1]).max() < 0.05
+
+
+def test_a_motion_is_played_through_a_plant_that_is_in_force_only_meanwhile(tmp_path):
+    motion, csv = held_out(PlantDescription(), shipped_rig()), tmp_path / 'held_out.csv'
+    write_command_file(csv, motion.table.time, motion.table.angle)
+    gaps = tuple(EffectSpec('gear_backlash', joint, {'gap_rad': 0.3}) for joint in JOINTS)
+    true = PlantDescription(effects=gaps)
+    off = {}
+    with graph(plant=true, folder=tmp_path) as live:
+        client = live.client
+        client.wait_until(lambda: False, 1.0)
+        for name, plant in (('described', PlantDescription()), ('true', true)):
+            file = tmp_path / f'{name}.yaml'
+            save_plant(plant, file)
+            player = MotionPlayer(client, lambda words: True)
+            player.play(motion, csv, tmp_path / name, file.read_text())
+            off[name] = tracked(tmp_path / name).rmse
+            assert read_parameter(client, 'compensator.mode').value == 'bouc_wen'
+            assert read_parameter(client, 'compensator.selected_by').value == 'class'
+        with pytest.raises(NotPlayedError, match='does not take the plant'):
+            player.play(motion, csv, tmp_path / 'none', 'joints: {elbow: {}}')
+        assert client.state != 'ENABLED'
+    assert off['true'] < 0.7 * off['described']
 
 
 def test_without_consent_nothing_moves(motion, tmp_path):

@@ -3,15 +3,19 @@
 One graph for all, in simulated time; after every attack it is enabled anew and has to stand still.
 """
 
+import json
 import math
+import time
 
 import numpy as np
 import pytest
 from commanded_graph import STILL, Moved, Sender
 from operated_graph import OperatedGraph
 from sensor_msgs.msg import Joy
+from simulated_graph import SimulatedGraph
 
 from endoscope_core.errors import NotPlayedError, RigStoppedError
+from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.signals import hold, move, sequence
 from endoscope_core.signals.command_file import JOINTS, CommandTable, write_command_file
 from endoscope_explain.investigation.motions import Motion
@@ -23,6 +27,7 @@ from endoscope_nodes.runtime.qos import EVENT
 
 UNDER_WAY = 0.2
 """Shaft angle in rad at which the motion is under way."""
+PATIENCE_S = 240.0
 STOPS_S = 0.6
 """Until the last one has noticed: three missed words of the clutch, and the way to a standstill."""
 
@@ -139,3 +144,79 @@ def test_a_stranger_at_the_clutch_is_a_fault(graph, motion, tmp_path, strangers)
     strangers.clear()
     graph.connect()
     assert stands_still(graph)
+
+
+@pytest.mark.parametrize('commands', [('pause',), ('disable',), ('pause', 'resume')])
+def test_a_session_that_is_taken_ends_the_motion(graph, motion, tmp_path, commands):
+    def happens():
+        for command in commands:
+            graph.command(command)
+
+    error = attacked(graph, motion, tmp_path, happens)
+    assert isinstance(error, NotPlayedError), error
+    assert stands_still(graph)
+
+
+def test_a_dead_man_who_lets_go_stops_the_motion(graph, motion, tmp_path, strangers):
+    strangers.append(graph.speak(Joy, MASTER_CLUTCH, EVENT))
+    let_go_ns = []
+
+    def beside(client):
+        if client.state != 'ENABLED':
+            client.order('enable')
+        strangers[0].publish(Joy(buttons=[int(not let_go_ns)]))
+
+    def since_let_go():
+        return bool(let_go_ns) and graph.clock.now_ns - let_go_ns[0] > 1.5e9
+
+    error = attacked(
+        graph,
+        motion,
+        tmp_path,
+        lambda: let_go_ns.append(graph.clock.now_ns),
+        beside,
+        hold_to_play=True,
+        withdrawn=since_let_go,
+    )
+    assert isinstance(error, NotPlayedError), error
+    late = [g.position for g in graph.goals if g.stamp_ns > let_go_ns[0] + STOPS_S * 1e9]
+    assert not late or np.ptp(late, axis=0).max() < STILL
+    assert stands_still(graph)
+
+
+def test_a_console_that_dies_ends_the_motion(graph, motion, tmp_path):
+    moved = []
+
+    def dies():
+        graph.kill('console')
+        graph.advance(STOPS_S)
+        moved.append(Moved(graph))
+
+    error = attacked(graph, motion, tmp_path, dies)
+    assert error is not None
+    assert moved[0].of_shafts < STILL
+    SimulatedGraph.start(graph, 'console')
+    graph.advance(1.0)
+    assert stands_still(graph)
+
+
+def test_a_program_that_is_killed_moves_nothing_on(graph, tmp_path):
+    save_plant(PlantDescription(), tmp_path / 'plant.yaml')
+    graph.command('disable')
+    graph.advance(0.5)
+    graph.goals.clear()
+    words = ['--plant', str(tmp_path / 'plant.yaml'), '--out', str(tmp_path / 'out')]
+    program = OperatedGraph.start(graph, 'investigate', *words, '--attended')
+    try:
+        end = time.monotonic() + PATIENCE_S
+        while not (graph.goals and abs(graph.goals[-1].position[0]) > UNDER_WAY):
+            assert program.poll() is None, program.communicate()
+            assert time.monotonic() < end
+            graph.pace()
+    finally:
+        program.kill()
+        program.communicate()
+    assert graph.state == 'ENABLED'
+    assert stands_still(graph)
+    log = json.loads((tmp_path / 'out' / 'log.json').read_text())
+    assert [each['recorded'] for each in log['rounds']] == [False]
