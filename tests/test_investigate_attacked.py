@@ -184,18 +184,19 @@ def test_a_dead_man_who_lets_go_stops_the_motion(graph, motion, tmp_path, strang
     assert stands_still(graph)
 
 
-def test_a_console_that_dies_ends_the_motion(graph, motion, tmp_path):
+@pytest.mark.parametrize('name', ['console', 'supervisor'])
+def test_a_node_that_dies_ends_the_motion(graph, motion, tmp_path, name):
     moved = []
 
     def dies():
-        graph.kill('console')
+        graph.kill(name)
         graph.advance(STOPS_S)
         moved.append(Moved(graph))
 
     error = attacked(graph, motion, tmp_path, dies)
     assert error is not None
     assert moved[0].of_shafts < STILL
-    SimulatedGraph.start(graph, 'console')
+    SimulatedGraph.start(graph, name)
     graph.advance(1.0)
     assert stands_still(graph)
 
