@@ -2,8 +2,9 @@
 
 `endoscope explain` writes a plant with all the physics that it found. A compensator inverts of it
 what stands between motor and tip and does not depend on the time since a recording began, which
-nobody knows later. What is left is tried before anything moves: the inverse of each joint, played
-through the plant itself, has to track better than no compensation at all.
+nobody knows later. What is left is tried before anything moves: the inverse of each joint is played
+through the plant itself. What makes it track worse is left out of the inverse, and with the rest it
+has to track better than no compensation at all.
 """
 
 from __future__ import annotations
@@ -76,7 +77,8 @@ class AdoptedPlant:
     text: str  # the plant file
     parameters: tuple[PhysicalParameters, ...]  # (J,), what is inverted
     ranges: tuple[BendingRange, ...]  # (J,), within the reach of the rig, rad
-    left_out: tuple[str, ...]  # what the file has and no inverse can know, `effect of joint`
+    # What the file has and no inverse can know, or tracks better without, `effect of joint`.
+    left_out: tuple[str, ...]
     # Rms error of the tip in rad on the trial, with the inverse and without, worst joint of J.
     tried: tuple[float, float]
 
@@ -143,8 +145,14 @@ def adopted_plant(text: str, rig: Rig, joints: tuple[str, ...]) -> AdoptedPlant:
                 f'{math.degrees(found.high):.0f} deg',
             )
         ranges.append(within)
-    tried = _tried(known, parameters, ranges, limits)
-    return AdoptedPlant(text, parameters, tuple(ranges), left_out, tried)
+    chosen, tried = _tried(known, parameters, ranges, limits)
+    worse = [
+        f'{definition_of(entry).id} of {entry.joint}'
+        for whole, kept in zip(parameters, chosen, strict=True)
+        for entry in whole.added
+        if entry not in kept.added
+    ]
+    return AdoptedPlant(text, chosen, tuple(ranges), (*left_out, *worse), tried)
 
 
 def _read(text: str) -> PlantDescription:
@@ -185,27 +193,39 @@ def _tried(
     parameters: tuple[PhysicalParameters, ...],
     ranges: list[BendingRange],
     limits: MotorLimits,
-) -> tuple[float, float]:
-    """Error of the tip in rad through the plant itself, with the inverse and without."""
+) -> tuple[tuple[PhysicalParameters, ...], tuple[float, float]]:
+    """What tracks best, and the tip's error in rad through the plant itself, and without it."""
     signal = periodic_signal(_CYCLE_S)
     time = np.arange(0.0, signal.duration, TICK)
     angle, velocity = signal(time)
     largest = np.array([min(-within.low, within.high) for within in ranges])
     scale = np.minimum(1.0, largest / np.max(np.abs(angle)))
     desired, speed = angle[:, None] * scale, velocity[:, None] * scale
-    feedforward = Feedforward(
-        len(parameters),
-        FeedforwardSettings(speed_limit=limits.speed / limits.gear, limits=limits),
-    )
-    feedforward.select(FeedforwardLaw(PHYSICAL, parameters))
-    command = np.array([feedforward.step(*now, TICK) for now in zip(desired, speed, strict=True)])
     steady = time >= signal.steady[0]
-    with_it, without = (
-        np.sqrt(np.mean((_tip(plant, limits, sent) - desired)[steady] ** 2, axis=0))
-        for sent in (command, desired)
-    )
+
+    def missed(sent: Array) -> Array:
+        """Rms error (J,) in rad."""
+        left = (_tip(plant, limits, sent) - desired)[steady]
+        return np.nan_to_num(np.sqrt(np.mean(left**2, axis=0)), nan=np.inf)
+
+    def followed(tried: tuple[PhysicalParameters, ...]) -> Array:
+        feedforward = Feedforward(
+            len(tried), FeedforwardSettings(speed_limit=limits.speed / limits.gear, limits=limits)
+        )
+        feedforward.select(FeedforwardLaw(PHYSICAL, tried))
+        steps = zip(desired, speed, strict=True)
+        return missed(np.array([feedforward.step(*now, TICK) for now in steps]))
+
+    best, with_it, without = parameters, followed(parameters), missed(desired)
+    ways = [_with_less(joint) for joint in parameters]
+    for k in range(max(map(len, ways))):
+        # The joints are tried side by side; one that has no way left plays its last again.
+        tried = tuple(own[min(k, len(own) - 1)] for own in ways)
+        error = followed(tried)
+        better = error < with_it
+        best = tuple(t if b else c for t, b, c in zip(tried, better, best, strict=True))
+        with_it = np.minimum(error, with_it)
     for name, error, passed in zip(plant.joints, with_it, without, strict=True):
-        # Also where it is not finite.
         if not error < passed:
             raise AdoptionError(
                 AdoptionCode.NOT_INVERTIBLE,
@@ -213,7 +233,17 @@ def _tried(
                 f'the inverse misses by {math.degrees(error):.2f} deg rms, and no compensation by '
                 f'{math.degrees(passed):.2f}',
             )
-    return float(np.max(with_it)), float(np.max(without))
+    return best, (float(np.max(with_it)), float(np.max(without)))
+
+
+def _with_less(joint: PhysicalParameters) -> list[PhysicalParameters]:
+    """A joint without each of its effects, its functions, and all of them; as it is with none."""
+    functions = tuple(entry for entry in joint.added if not isinstance(entry, EffectSpec))
+    parts = [(e,) for e in joint.added if isinstance(e, EffectSpec)]
+    parts += [functions] if functions else []
+    kept = [tuple(e for e in joint.added if e not in part) for part in parts]
+    kept += [()] if len(parts) > 1 else []
+    return [replace(joint, added=each) for each in kept] or [joint]
 
 
 def _tip(plant: PlantDescription, limits: MotorLimits, command: Array) -> Array:

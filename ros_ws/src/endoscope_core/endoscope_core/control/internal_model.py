@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -26,7 +27,7 @@ from endoscope_core.physics.description import (
     PlantDescription,
     TermSpec,
 )
-from endoscope_core.physics.effect import Effect
+from endoscope_core.physics.effect import Effect, Stage
 from endoscope_core.physics.effects import describe
 from endoscope_core.physics.functions import describe_place
 from endoscope_core.physics.kernel import advance_tick, exponent_varies, settle, tensions
@@ -39,6 +40,7 @@ from endoscope_core.physics.layout import (
 )
 from endoscope_core.physics.packing import pack, rest_state
 from endoscope_core.physics.sheath import MOTOR_END
+from endoscope_core.physics.simulator import simulate
 
 PROFILE = 'friction_profile'
 Array = NDArray[np.float64]
@@ -55,6 +57,8 @@ _JOINT_STEP = 0.1
 _TRIES = 60
 _STEPS = 1000
 _MOST_TURNS = 12
+_RAMPS, _RAMP_S = (0.1, 0.2), 5.0
+"""Speeds of a shaft in rad/s, and how long it turns, which tell the lag of a servo with effects."""
 _ALONE = 'joint'
 _BEYOND = 10.0
 """Rad to which no joint bends."""
@@ -67,6 +71,22 @@ class PhysicalParameters:
     # Of the nominal plant; the capstan exponent is the tube's.
     joint: JointParameters = field(default_factory=JointParameters)
     added: Added = ()  # of an adopted plant
+
+    @cached_property
+    def servo_lag(self) -> float:
+        """Time in s by which the servo follows a steady motion late."""
+        # Kept: it takes 10 ms where the servo has effects, and a law is put in force between ticks.
+        if not any(definition_of(entry).stage is Stage.ACTUATOR for entry in self.added):
+            return 2.0 * self.joint.motor_damping_ratio / self.joint.motor_bandwidth
+        # What stays away by the same angle at any speed is no lag.
+        behind = [self._behind_ramp(speed) for speed in _RAMPS]
+        return max(0.0, (behind[1] - behind[0]) / (_RAMPS[1] - _RAMPS[0]))
+
+    def _behind_ramp(self, speed: float) -> float:
+        """By what angle in rad a shaft is behind a command of this speed in the end, rad/s."""
+        command = speed * TICK * np.arange(round(_RAMP_S / TICK))
+        run = simulate(plant_of_joint(self.joint, self.added), command[:, None], TICK)
+        return float(command[-1] - run.shaft_position[-1, 0])
 
     def to_dict(self) -> dict[str, Any]:
         """All nominal numbers by name; the friction profile is a list."""

@@ -4,44 +4,16 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from endoscope_core.control.internal_model import (
-    TICK,
     InternalModel,
     PhysicalParameters,
     TurningPoints,
-    definition_of,
-    plant_of_joint,
 )
 from endoscope_core.control.limits import COUNT, MotorLimits, shipped_limits
 from endoscope_core.control.plant_learning import PlantLearning, PlantLearningSettings
-from endoscope_core.physics.effect import Stage
-from endoscope_core.physics.simulator import simulate
 
 SWING = 1.0
 """Rad from which a joint is taken to have come whose motion is known by its direction alone."""
-
-
-_RAMPS, _RAMP_S = (0.1, 0.2), 5.0
-"""Speeds of a shaft in rad/s, and how long it turns, which tell the lag of a servo with effects."""
-
-
-def servo_lag(parameters: PhysicalParameters) -> float:
-    """Time in s by which the servo of a joint follows a steady motion late."""
-    joint = parameters.joint
-    if not any(definition_of(entry).stage is Stage.ACTUATOR for entry in parameters.added):
-        return 2.0 * joint.motor_damping_ratio / joint.motor_bandwidth
-    # What stays away by the same angle at any speed is no lag.
-    behind = [_behind_ramp(parameters, speed) for speed in _RAMPS]
-    return max(0.0, (behind[1] - behind[0]) / (_RAMPS[1] - _RAMPS[0]))
-
-
-def _behind_ramp(parameters: PhysicalParameters, speed: float) -> float:
-    """By what angle in rad a shaft is behind a command of this speed in the end, rad/s."""
-    command = speed * TICK * np.arange(round(_RAMP_S / TICK))
-    run = simulate(plant_of_joint(parameters.joint, parameters.added), command[:, None], TICK)
-    return float(command[-1] - run.shaft_position[-1, 0])
 
 
 class PhysicalInverse:
@@ -61,8 +33,7 @@ class PhysicalInverse:
         self.parameters = parameters
         self.limits = limits or shipped_limits()
         self._dead_band = dead_band
-        # Time in s by which the servo follows a steady motion late.
-        self.servo_lag = servo_lag(parameters)
+        self.servo_lag = parameters.servo_lag
         self.other = 0.0  # where the other joint is to be, rad: the two may be coupled
         self.model = InternalModel(parameters.joint, self.limits, parameters.added)
         self._turns = TurningPoints([0.0])

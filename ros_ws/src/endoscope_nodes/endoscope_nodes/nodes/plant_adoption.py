@@ -175,7 +175,7 @@ class PlantAdoption:
             return 'no plant has been adopted'
         left_out = ', '.join(self.plant.left_out)
         return f'plant {self.plant.hash} adopted' + (
-            f' without {left_out}, which no inverse can know' if left_out else ''
+            f' but for {left_out}, which the inverse does better without' if left_out else ''
         )
 
     def _reject(self, request: AdoptionRequest, error: AdoptionError) -> None:
