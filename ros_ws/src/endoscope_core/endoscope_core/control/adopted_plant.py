@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from endoscope_core.choices import PHYSICAL
 from endoscope_core.control.feedforward import Feedforward, FeedforwardLaw, FeedforwardSettings
 from endoscope_core.control.internal_model import (
+    Added,
     BendingRange,
     PhysicalParameters,
     added_to,
@@ -239,7 +240,7 @@ def _tried(
 def _with_less(joint: PhysicalParameters) -> list[PhysicalParameters]:
     """A joint without each of its effects, its functions, and all of them; as it is with none."""
     functions = tuple(entry for entry in joint.added if not isinstance(entry, EffectSpec))
-    parts = [(e,) for e in joint.added if isinstance(e, EffectSpec)]
+    parts: list[Added] = [(e,) for e in joint.added if isinstance(e, EffectSpec)]
     parts += [functions] if functions else []
     kept = [tuple(e for e in joint.added if e not in part) for part in parts]
     kept += [()] if len(parts) > 1 else []

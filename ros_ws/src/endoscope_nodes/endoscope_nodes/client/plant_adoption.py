@@ -64,7 +64,7 @@ class PlantInForce:
     plant: str = ''  # text of its file; empty where none has been adopted
     hash: str = ''  # of that text
     before: str = ''  # hash of the plant before, which can be put into force again
-    # What stands in the file and no inverse can know.
+    # What stands in the file and no inverse can know, or tracks better without.
     left_out: tuple[str, ...] = ()
     # How far each of J joints may be bent in rad; empty where that is not known.
     ranges: tuple[BendingRange, ...] = ()
