@@ -14,6 +14,7 @@ from endoscope_core.signals import hold, move, sequence
 from endoscope_core.signals.command_file import JOINTS, CommandTable, read_command_file
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.explanation import Verdict
+from endoscope_explain.explanation import Verdict
 from endoscope_explain.investigation.investigation import (
     Investigation,
     investigate,
@@ -251,3 +252,10 @@ def test_a_motion_that_is_too_fast_is_refused():
     motion = Motion('jump', 'bend_x', '', CommandTable(JOINTS, time, angle))
     with pytest.raises(MotionRefusedError, match='speed is 10 rad/s'):
         require_allowed(motion, RIG)
+
+
+def test_physics_without_a_name_is_not_said_to_be_one(both, told):
+    unnamed = dataclasses.replace(told, verdict=Verdict.UNKNOWN_PHYSICS, effects=())
+    log = investigate(both, no_rig, lambda bags: unnamed)
+    assert log.stopped is Stop.ONE_CLASS
+    assert 'what is missing has no name, and so no rival, after one motion' in log.words

@@ -17,7 +17,7 @@ from endoscope_core.rig import Rig
 from endoscope_core.signals.command_file import JOINTS, write_command_file
 from endoscope_explain.case import ExplainedCase, NextExperiment
 from endoscope_explain.design import NUMBERS, is_wide, narrow, propose, propose_beside_numbers
-from endoscope_explain.explanation import NamedEffect
+from endoscope_explain.explanation import NamedEffect, Verdict
 from endoscope_explain.investigation import log as logs
 from endoscope_explain.investigation.log import Answer, Log, Name, Round, Stop
 from endoscope_explain.investigation.motions import (
@@ -181,8 +181,10 @@ class _Running:
         left = ''.join(f' {r.id} is not told from {" or ".join(r.rivals)}.' for r in rivals[:1])
         count = len(self.log.whole)
         after = f'after {count} motions' if count > 1 else 'after one motion'
+        unnamed = answer is not None and answer.verdict == Verdict.UNKNOWN_PHYSICS
+        alone = 'what is missing has no name, and so no rival,' if unnamed else 'no name has a rival'
         return {
-            Stop.ONE_CLASS: f'no name has a rival {after}.',
+            Stop.ONE_CLASS: f'{alone} {after}.',
             Stop.NOTHING_TO_GAIN: f'no safe motion is expected to tell more {after}.{left}',
             Stop.USED_UP: f'no more than {self.of.experiments} experiments were wanted.{left}',
         }[stop]
