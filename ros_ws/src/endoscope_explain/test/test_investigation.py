@@ -14,7 +14,6 @@ from endoscope_core.signals import hold, move, sequence
 from endoscope_core.signals.command_file import JOINTS, CommandTable, read_command_file
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.explanation import Verdict
-from endoscope_explain.explanation import Verdict
 from endoscope_explain.investigation.investigation import (
     Investigation,
     investigate,

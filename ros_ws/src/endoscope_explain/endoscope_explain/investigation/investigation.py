@@ -182,7 +182,9 @@ class _Running:
         count = len(self.log.whole)
         after = f'after {count} motions' if count > 1 else 'after one motion'
         unnamed = answer is not None and answer.verdict == Verdict.UNKNOWN_PHYSICS
-        alone = 'what is missing has no name, and so no rival,' if unnamed else 'no name has a rival'
+        alone = (
+            'what is missing has no name, and so no rival,' if unnamed else 'no name has a rival'
+        )
         return {
             Stop.ONE_CLASS: f'{alone} {after}.',
             Stop.NOTHING_TO_GAIN: f'no safe motion is expected to tell more {after}.{left}',
