@@ -12,6 +12,7 @@ import pytest
 from commanded_graph import STILL, Moved, Sender
 from operated_graph import OperatedGraph
 from sensor_msgs.msg import Joy
+from std_msgs.msg import Header
 from simulated_graph import SimulatedGraph
 
 from endoscope_core.errors import NotPlayedError, RigStoppedError
@@ -22,7 +23,7 @@ from endoscope_explain.investigation.motions import Motion
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import GraphError
 from endoscope_nodes.client.motion_player import MotionPlayer
-from endoscope_nodes.names import MASTER_CLUTCH, SLAVE_COMMAND
+from endoscope_nodes.names import MASTER_CLUTCH, MOTION_SESSION, SLAVE_COMMAND
 from endoscope_nodes.runtime.qos import EVENT
 
 UNDER_WAY = 0.2
@@ -221,3 +222,19 @@ def test_a_program_that_is_killed_moves_nothing_on(graph, tmp_path):
     assert stands_still(graph)
     log = json.loads((tmp_path / 'out' / 'log.json').read_text())
     assert [each['recorded'] for each in log['rounds']] == [False]
+
+
+@pytest.mark.parametrize('session', ['', 'session-99'])
+def test_a_rival_of_the_supervisor_ends_the_motion(graph, motion, tmp_path, strangers, session):
+    def happens():
+        strangers.append(graph.speak(Header, MOTION_SESSION, EVENT))
+        strangers[-1].publish(Header(frame_id=session))
+        graph.advance(0.1)
+
+    error = attacked(graph, motion, tmp_path, happens)
+    assert isinstance(error, (RigStoppedError, NotPlayedError, GraphError)), error
+    for publisher in strangers:
+        graph.probe.destroy_publisher(publisher)
+    strangers.clear()
+    graph.connect()
+    assert stands_still(graph)
