@@ -12,8 +12,8 @@ import pytest
 from commanded_graph import STILL, Moved, Sender
 from operated_graph import OperatedGraph
 from sensor_msgs.msg import Joy
-from std_msgs.msg import Header
 from simulated_graph import SimulatedGraph
+from std_msgs.msg import Header
 
 from endoscope_core.errors import NotPlayedError, RigStoppedError
 from endoscope_core.physics import PlantDescription, save_plant
