@@ -292,6 +292,21 @@ BENCHES: dict[str, Bench] = {
             _jobs(),
         ),
     ),
+    'validity': Bench(
+        'validity',
+        'how long a calibration stays good',
+        'Calibrates rigs in tubes that nothing was fitted on, lets wires, sheaths, tube and load '
+        'become what they become in four hours of work, and prints from time to time what another '
+        'calibration says, how the tip tracks by the first calibration and by the new one, and '
+        'whether a watch tells that the rig has changed. Seeds from 1 to 100 are for development.',
+        (
+            _seeds('of the tubes (1-3)'),
+            _only('cause'),
+            _file('--json', 'file for all rows; what is in it is not done again'),
+            _file('--picture', 'SVG file for a picture of it'),
+            _jobs(),
+        ),
+    ),
     'watched': Bench(
         'watch.cost',
         'what it costs the graph that the rig is watched',
