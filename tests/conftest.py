@@ -4,6 +4,8 @@ import os
 import sys
 from pathlib import Path
 
+import pytest
+
 # pytest imports each test file by its path; what they share is imported by name.
 sys.path.insert(0, str(Path(__file__).parent))
 # Wrong types in messages are errors in tests; rclpy reads this when message classes are imported.
@@ -12,3 +14,12 @@ os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 pytest_plugins = ['run_report']
+
+
+@pytest.fixture(scope='module')
+def browser():
+    # Only tests in a browser need what it is driven by.
+    from chromium import chromium
+
+    with chromium() as browser:
+        yield browser

@@ -12,7 +12,6 @@ from browsed_console import (
     take,
     until,
 )
-from chromium import chromium
 from playwright.sync_api import expect
 
 SHARE = "(button) => Number(button.style.getPropertyValue('--share'))"
@@ -75,12 +74,6 @@ ANIMATION = """() => {
   document.body.append(alarm);
   return getComputedStyle(alarm).animationName;
 }"""
-
-
-@pytest.fixture(scope='module')
-def browser():
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope='module')

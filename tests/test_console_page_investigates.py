@@ -5,7 +5,6 @@ import re
 
 import pytest
 from browsed_console import BrowsedConsole, grip, hold, shows, take, until
-from chromium import chromium
 from playwright.sync_api import expect
 
 from endoscope_core.physics import PlantDescription, save_plant
@@ -13,12 +12,6 @@ from endoscope_core.physics import PlantDescription, save_plant
 FAR = 0.03
 """rad at a motor's shaft that no noise makes."""
 WHY = 'Why: Nothing is known of the rig yet but its description.'
-
-
-@pytest.fixture(scope='module')
-def browser():
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope='module')

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from chromium import chromium, drawn
+from chromium import drawn
 from playwright.sync_api import Browser, Frame, Locator, Page, expect
 
 from endoscope_pages import Curve, Plot, figure_html
@@ -49,12 +49,6 @@ CanvasRenderingContext2D.prototype.fillText = function (text, ...rest) {
   return write.call(this, text, ...rest);
 };
 </script>"""
-
-
-@pytest.fixture(scope='module')
-def browser() -> Iterator[Browser]:
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,8 @@ from threadpoolctl import threadpool_limits
 
 from endoscope_benchmarks.bench import (
     keep_row,
-    kept_rows,
     report,
+    rows_so_far,
     side_by_side,
     table_head,
     table_row,
@@ -23,7 +23,7 @@ from endoscope_benchmarks.bench import (
 from endoscope_benchmarks.concealed.forms import DRAWN
 from endoscope_benchmarks.concealed.judge import Case, judged, statements
 from endoscope_benchmarks.concealed.strata import AIM, as_strong
-from endoscope_benchmarks.papers.tracking_trial import SHARE_OF_REACH, run_tracking_trial
+from endoscope_benchmarks.papers.tracking_trial import run_tracking_trial, within_ranges
 from endoscope_benchmarks.proof.another_rig import FORMS, Laws, read
 from endoscope_benchmarks.proof.drawing import of_other_simulator
 from endoscope_core.control import AdoptedPlant, AdoptionError, FeedforwardLaw, adopted_plant
@@ -106,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
     of_kind = {KNOWN: args.seeds, UNKNOWN: args.others, FOREIGN: args.foreign}
     calls = [(kind, seed) for kind, seeds in of_kind.items() for seed in seeds or ()]
     ends = time.monotonic() + args.within
-    kept = kept_rows(args.json, Row) if args.json and args.json.exists() else []
+    kept = rows_so_far(args.json, Row)
     rows = {(row.kind, row.seed): row for row in kept}
     errors = (f'{plant}, deg' for plant in _PLANTS)
     print(today_and_machine())
@@ -194,11 +194,8 @@ def _row(kind: str, seed: int, rig: DrawnRig, explained: ExplainedCase, seconds:
             laws[name] = as_adopted(plant)
         except AdoptionError as error:
             why[name] = f'{error.code}'
-    ends = [min(-r.low, r.high) for law in laws.values() for r in law.ranges]
-    signal = non_periodic_signal()
-    largest = float(np.max(np.abs(signal(np.arange(0.0, signal.duration, 0.01))[0])))
-    signal = signal.scaled(min(1.0, SHARE_OF_REACH * min(ends) / largest))
-
+    ranges = [within for law in laws.values() for within in law.ranges]
+    signal = within_ranges(non_periodic_signal(), ranges)
     errors = dict.fromkeys(_PLANTS, math.nan)
     errors |= {name: rig.error(signal, law.law) for name, law in laws.items()}
     if 'adopted' in why:

@@ -56,6 +56,11 @@ def kept_rows[R](file: Path, kind: type[R]) -> list[R]:
     return rows
 
 
+def rows_so_far[R](file: Path | None, kind: type[R]) -> list[R]:
+    """Read the rows that a bench kept before it was ended; none without a file."""
+    return kept_rows(file, kind) if file is not None and file.exists() else []
+
+
 def keep_row(file: Path, row: Any) -> None:
     """Add a row, which is a dataclass, at the end of a file of JSON lines."""
     with file.open('a', encoding='utf-8') as lines:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from endoscope_benchmarks.bench import keep_row, kept_rows, side_by_side, table_head, table_row
+from endoscope_benchmarks.bench import keep_row, rows_so_far, side_by_side, table_head, table_row
 from endoscope_benchmarks.concealed.judge import Case
 from endoscope_benchmarks.concealed.readings import TRACKER_TICKS, Readings, as_sensed
 from endoscope_benchmarks.concealed.readings import read as read_own
@@ -69,7 +69,7 @@ class Asked(Row):
 
 def run(args: argparse.Namespace) -> int:
     """Print a line for each rig and way, then the table; return 1 if a rig failed."""
-    before = kept_rows(args.json, Asked) if args.json and args.json.exists() else []
+    before = rows_so_far(args.json, Asked)
     done = {row.seed for row in before if row.by == FIXED}
     until = time.time() + 60.0 * args.minutes
     calls = [

@@ -3,18 +3,14 @@
 import argparse
 import os
 import tempfile
-import time
 from collections import defaultdict
 
-from endoscope_benchmarks.graph import SIMULATED, Composition
-from endoscope_nodes.graph import ALL_NODES
-from endoscope_nodes.nodes.simulation_clock import SimulationClockNode
+from endoscope_benchmarks.graph import least_cores
 
 TARGET_CORES = 0.03
 _KEPT_S = 20.0
 # Until the ring is full, and drops as much as it takes.
 _SETTLING_S = _KEPT_S + 1.0
-_BEGUN_S = 0.5
 _RECORDERS: dict[str, dict[str, object]] = {
     'hears nothing': {'topics': ['nothing'], 'autostart': False, 'keep': 0.0},
     'hears all, keeps nothing': {'autostart': False, 'keep': 0.0},
@@ -44,26 +40,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def cores_of(recorder: dict[str, object], seconds: float) -> float:
-    """Least CPU time of all nodes in one process in a second of a motion, with a recorder.
-
-    In lock-step: the same ticks with the same messages, however busy the machine is.
-    """
+    """Least CPU time of all nodes in a second of a motion, with a recorder."""
     with tempfile.TemporaryDirectory() as folder:
         overrides: dict[str, dict[str, object]] = {
             'recorder': {'bag': f'{folder}/bag'} | recorder,
             'console': {'source': 'motion', 'motion': 'periodic'},
         }
-        graph = Composition((*ALL_NODES, SimulationClockNode), overrides, SIMULATED)
-        try:
-            graph.advance(_BEGUN_S)
-            graph.enable()
-            graph.advance(_SETTLING_S)
-            costs = []
-            for _ in range(round(seconds)):
-                cpu = time.process_time()
-                graph.advance(1.0)
-                costs.append(time.process_time() - cpu)
-            # What else a machine does only adds, by its caches.
-            return min(costs)
-        finally:
-            graph.close()
+        return least_cores(overrides, _SETTLING_S, seconds)

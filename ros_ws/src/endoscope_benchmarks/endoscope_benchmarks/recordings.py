@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from endoscope_bags import open_bag
 from endoscope_bags.copying import cut
-from endoscope_benchmarks.bench import keep_row, kept_rows, side_by_side, table_head, table_row
+from endoscope_benchmarks.bench import keep_row, rows_so_far, side_by_side, table_head, table_row
 from endoscope_bringup.demo.live_graph import LiveGraph
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import JointParameters, PlantDescription, save_plant
@@ -30,7 +30,7 @@ def run(args: argparse.Namespace) -> int:
     """Print a line for each recording and a table; return 0."""
     args.out.mkdir(parents=True, exist_ok=True)
     kept = args.out / 'rows.jsonl'
-    rows = {row.seed: row for row in (kept_rows(kept, Row) if kept.exists() else ())}
+    rows = {row.seed: row for row in rows_so_far(kept, Row)}
     calls = [(seed, args.out) for seed in args.seeds if seed not in rows]
     for done, (_, future) in enumerate(
         side_by_side(args.jobs, recorded_and_explained, calls), len(args.seeds) - len(calls) + 1

@@ -15,8 +15,8 @@ from threadpoolctl import threadpool_limits
 from endoscope_benchmarks.bench import (
     chosen,
     keep_row,
-    kept_rows,
     report,
+    rows_so_far,
     side_by_side,
     table_head,
     table_row,
@@ -29,6 +29,7 @@ from endoscope_benchmarks.papers.tracking_trial import (
     run_tracking_trial,
     within_reach,
 )
+from endoscope_benchmarks.watch.changing_rig import MovingRig, show
 from endoscope_core.atomic_output import write_text
 from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_core.control import FeedforwardLaw
@@ -37,8 +38,6 @@ from endoscope_core.identification.law_choice import CalibrationFindings, LawCho
 from endoscope_core.monitoring import RigWatch
 from endoscope_core.monitoring.rig_watch import BLOCK_S
 from endoscope_core.physics import EffectSpec, PlantDescription, SensorModel, layout
-from endoscope_core.physics.kernel import run_joints
-from endoscope_core.physics.packing import pack, rest_state
 from endoscope_core.physics.simulator import TICK
 from endoscope_core.signals import non_periodic_signal
 from endoscope_pages.still_pictures import STYLE, svg
@@ -58,7 +57,7 @@ SCHEMES = {
     NEW_PLANT: ('physical', 'plant', True),
 }
 """Mode, by what it was selected, and whether by the calibration of the moment."""
-_BLOCK, _TRACKER_TICKS = round(BLOCK_S / TICK), 25
+_BLOCK = round(BLOCK_S / TICK)
 _BEFORE_S, _AFTER_S = 60.0, 15.0
 _LOST_N, _RETENSIONED, _RUN_IN, _RUN_IN_H, _LOAD_NM = 1.6, 2.0, 0.3, 1.0, 8e-4
 _BENT = ((1.0, 1.0), (2.0, 1.4), (3.0, 0.8), (math.inf, 1.6))
@@ -127,8 +126,7 @@ class Row:
 def run(args: argparse.Namespace) -> int:
     """Print a table, and draw it if asked for; return 0."""
     causes = tuple(chosen('cause', args.only, CAUSES))
-    kept = kept_rows(args.json, Row) if args.json and args.json.exists() else []
-    rows = {(row.cause, row.seed, row.hour): row for row in kept}
+    rows = {(row.cause, row.seed, row.hour): row for row in rows_so_far(args.json, Row)}
     calls = [(c, s) for s in args.seeds for c in causes if (c, s, HOURS[-1]) not in rows]
     for done, (call, future) in enumerate(side_by_side(args.jobs, aged, calls), 1):
         for row in future.result():
@@ -203,41 +201,21 @@ def is_told(tube: NeverSeenTube, slow: Slow, first: CalibrationFindings, seed: i
     load = {'moment_nm': slow.moment, 'time_s': _BEFORE_S}
     effects = [EffectSpec('configuration_change', name, changes) for name in names]
     effects += [EffectSpec('external_load', name, load) for name in names]
-    parameters, on = pack(replace(tube.plant, effects=tuple(effects)))
-    state, sensors = rest_state(parameters, on, TICK), SensorModel(tube.plant.sensors, seed)
+    rig = MovingRig(replace(tube.plant, effects=tuple(effects)))
+    sensors = SensorModel(tube.plant.sensors, seed)
     stiffness = np.array([joint.wire_stiffness for joint in tube.plant.joints.values()])
     generator = np.random.default_rng(seed)
     parts: list[Array] = []
     while sum(map(len, parts)) * TICK < _BEFORE_S + _AFTER_S:
         parts.append(motions.teleoperation(generator, len(names)))
     moving = np.concatenate(parts)
-    ticks: Array = TICK * np.arange(_BLOCK, dtype=np.float64)
     for begin in range(0, round((_BEFORE_S + _AFTER_S) / TICK), _BLOCK):
         if begin == round(_BEFORE_S / TICK):
             travel = slice(layout.TRAVEL, layout.TRAVEL + 2)
-            state[0][:, travel] += (slow.lost / stiffness)[:, None]
+            rig.state[0][:, travel] += (slow.lost / stiffness)[:, None]
         setpoint = moving[begin : begin + _BLOCK]
-        inputs = np.full((len(names), _BLOCK, layout.INPUTS), np.nan)
-        inputs[:, :, layout.IN_COMMAND], inputs[:, :, layout.IN_OTHER_JOINT] = setpoint.T, 0.0
-        out = np.empty((len(names), _BLOCK, layout.OUTPUTS))
-        run_joints(*state, parameters, on, inputs, True, TICK, out)
-        _add(watch, begin * TICK + ticks, setpoint, out, sensors)
+        show(watch, sensors, begin, setpoint, rig.move(setpoint))
     return any(alarm.at >= _BEFORE_S for alarm in watch.alarms)
-
-
-def _add(
-    watch: RigWatch, time: Array, setpoint: Array, readings: Array, sensors: SensorModel
-) -> None:
-    out = readings.transpose(1, 0, 2)
-    watch.setpoint.append(time, setpoint)
-    shaft = sensors.shaft_position(out[:, :, layout.OUT_MOTOR])
-    effort = sensors.shaft_effort(out[:, :, layout.OUT_EFFORT])
-    watch.motor.append(time, np.hstack([shaft, effort]))
-    wires = out[:, :, layout.OUT_TENSION_A : layout.OUT_TENSION_B + 1]
-    watch.wires.append(time, sensors.tension(wires))
-    seen = slice(None, None, _TRACKER_TICKS)
-    watch.tracker.append(time[seen], sensors.bending(out[seen, :, layout.OUT_BENDING]))
-    watch.update(float(time[-1]))
 
 
 def table(rows: Sequence[Row], causes: Sequence[str]) -> str:

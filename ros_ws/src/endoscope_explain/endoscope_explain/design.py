@@ -373,17 +373,17 @@ def narrow(
     if not strength:
         return None
 
-    def precision(recording: Recording) -> Array:
+    def seen(recording: Recording) -> JointModel:
         observation = next(o for o in observe(recording, plant) if o.joint == effect.joint)
-        model = JointModel(observation, base, flags, free)
+        return JointModel(observation, base, flags, free)
+
+    def precision(model: JointModel) -> Array:
         theta = [i.coordinate(1.0 if i.index == LEAD else float(base[i.index])) for i in free]
         slope = jacobian(model, np.array(theta))
         return np.asarray(slope.T @ slope)
 
-    model = JointModel(
-        next(o for o in observe(recording, plant) if o.joint == effect.joint), base, flags, free
-    )
-    before = precision(recording) + np.diag(model.prior_weight() ** 2)
+    own = seen(recording)
+    before = precision(own) + np.diag(own.prior_weight() ** 2)
 
     def deviation(known: Array) -> float:
         return float(np.sqrt(np.linalg.inv(known)[strength[0], strength[0]]))
@@ -394,7 +394,9 @@ def narrow(
         if (motion.name, motion.joint) not in played
     ]
     after = parallel_map(
-        lambda m: deviation(before + precision(imagine(plant, m, recording.rig))), motions, jobs
+        lambda m: deviation(before + precision(seen(imagine(plant, m, recording.rig)))),
+        motions,
+        jobs,
     )
     shares = [each / deviation(before) for each in after]
     if not shares or min(shares) > HALVED:

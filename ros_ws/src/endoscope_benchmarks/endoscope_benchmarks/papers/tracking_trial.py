@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from endoscope_core.classifier.classification import Classifier, UnseenTensionEr
 from endoscope_core.control import (
     ADAPTIVE_PHYSICAL,
     AdaptiveBacklashController,
+    BendingRange,
     DesiredMotion,
     Feedforward,
     FeedforwardLaw,
@@ -149,9 +151,14 @@ def calibrate(tube: NeverSeenTube, classifier: Classifier) -> CalibrationFinding
 
 def within_reach(signal: Signal, plant: PlantDescription) -> Signal:
     """A signal, scaled to 80 % of what every joint of a plant reaches where that is less."""
+    return within_ranges(signal, list(map(bending_range, plant.joints.values())))
+
+
+def within_ranges(signal: Signal, ranges: Sequence[BendingRange]) -> Signal:
+    """A signal, scaled to 80 % of the nearest end of any range where that is less."""
     angle, _ = signal(np.arange(0.0, signal.duration, 0.01))
-    ends = [(-reached.low, reached.high) for reached in map(bending_range, plant.joints.values())]
-    return signal.scaled(min(1.0, SHARE_OF_REACH * np.min(ends) / float(np.max(np.abs(angle)))))
+    end = min(min(-float(reached.low), float(reached.high)) for reached in ranges)
+    return signal.scaled(min(1.0, SHARE_OF_REACH * end / float(np.max(np.abs(angle)))))
 
 
 def backlash_left(trial: TrackingTrial, signal: Signal) -> float:

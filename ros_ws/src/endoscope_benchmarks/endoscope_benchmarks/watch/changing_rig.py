@@ -107,18 +107,7 @@ def _watched(kind: str, seed: int, thresholds: Mapping[str, float]) -> Watched:
     largest = dict.fromkeys(map(str, Part), 0.0)
     for begin in range(0, len(moving) - _BLOCK + 1, _BLOCK):
         setpoint = moving[begin : begin + _BLOCK]
-        out = rig.move(setpoint).transpose(1, 0, 2)
-        time = (begin + np.arange(_BLOCK)) * TICK
-        watch.setpoint.append(time, setpoint)
-        shaft = sensors.shaft_position(out[:, :, layout.OUT_MOTOR])
-        watch.motor.append(
-            time, np.hstack([shaft, sensors.shaft_effort(out[:, :, layout.OUT_EFFORT])])
-        )
-        wires = out[:, :, layout.OUT_TENSION_A : layout.OUT_TENSION_B + 1]
-        watch.wires.append(time, sensors.tension(wires))
-        seen = slice(None, None, _TRACKER_TICKS)
-        watch.tracker.append(time[seen], sensors.bending(out[seen, :, layout.OUT_BENDING]))
-        watch.update(float(time[-1]))
+        show(watch, sensors, begin, setpoint, rig.move(setpoint))
         for part, gain in watch.gains().items():
             largest[part] = max(largest[part], gain)
     alarms = sorted(watch.alarms, key=lambda alarm: alarm.at)
@@ -133,7 +122,40 @@ def _watched(kind: str, seed: int, thresholds: Mapping[str, float]) -> Watched:
     )
 
 
-class _ChangingRig:
+def show(
+    watch: RigWatch, sensors: SensorModel, begin: int, setpoint: Array, readings: Array
+) -> None:
+    """Show a watch noise-free readings (J, N, OUTPUTS) from a tick on, by a rig's sensors."""
+    time, out = (begin + np.arange(len(setpoint))) * TICK, readings.transpose(1, 0, 2)
+    watch.setpoint.append(time, setpoint)
+    shaft = sensors.shaft_position(out[:, :, layout.OUT_MOTOR])
+    effort = sensors.shaft_effort(out[:, :, layout.OUT_EFFORT])
+    watch.motor.append(time, np.hstack([shaft, effort]))
+    wires = out[:, :, layout.OUT_TENSION_A : layout.OUT_TENSION_B + 1]
+    watch.wires.append(time, sensors.tension(wires))
+    seen = slice(None, None, _TRACKER_TICKS)
+    watch.tracker.append(time[seen], sensors.bending(out[seen, :, layout.OUT_BENDING]))
+    watch.update(float(time[-1]))
+
+
+class MovingRig:
+    """A simulated rig at rest, whose packed numbers and state may be changed while it moves."""
+
+    def __init__(self, plant: PlantDescription) -> None:
+        self.parameters, self._on = pack(plant)
+        self.state = rest_state(self.parameters, self._on, TICK)
+
+    def move(self, setpoint: Array) -> Array:
+        """Noise-free readings (J, N, OUTPUTS) while setpoints (N, J) are in force."""
+        joints, ticks = len(self.parameters), len(setpoint)
+        inputs = np.zeros((joints, ticks, layout.INPUTS))
+        inputs[:, :, layout.IN_COMMAND], inputs[:, :, layout.IN_MOTOR] = setpoint.T, np.nan
+        out = np.empty((joints, ticks, layout.OUTPUTS))
+        run_joints(*self.state, self.parameters, self._on, inputs, True, TICK, out)
+        return out
+
+
+class _ChangingRig(MovingRig):
     """A simulated rig whose numbers, or wires, become others at a moment."""
 
     def __init__(
@@ -153,25 +175,21 @@ class _ChangingRig:
             off['configuration_change'] = {'time_s': at, 'factor': factor}
             effects += [EffectSpec(effect, name, values) for effect, values in off.items()]
         self._stiffness = true.joints[true.joint_names()[self._joint]].wire_stiffness
-        self._p, self._on = pack(replace(true, effects=tuple(effects)))
-        self._state = rest_state(self._p, self._on, TICK)
+        super().__init__(replace(true, effects=tuple(effects)))
         self._ticks, self._bent = 0, (0.0, 0.0)
 
     def move(self, setpoint: Array) -> Array:
         """Noise-free readings (J, N, OUTPUTS) while setpoints (N, J) are in force."""
         if self._kind and self._ticks == self._at:
             self._change()
-        inputs = np.zeros((len(self._p), len(setpoint), layout.INPUTS))
-        inputs[:, :, layout.IN_COMMAND], inputs[:, :, layout.IN_MOTOR] = setpoint.T, np.nan
-        out = np.empty((len(self._p), len(setpoint), layout.OUTPUTS))
-        run_joints(*self._state, self._p, self._on, inputs, True, TICK, out)
+        out = super().move(setpoint)
         self._ticks += len(setpoint)
         bent = out[self._joint, :, layout.OUT_JOINT]
         self._bent = min(self._bent[0], bent.min()), max(self._bent[1], bent.max())
         return out
 
     def _change(self) -> None:
-        row, state = self._p[self._joint], self._state[0][self._joint]
+        row, state = self.parameters[self._joint], self.state[0][self._joint]
         if self._kind in _OF_EFFECT:
             effect, off, typical = _OF_EFFECT[self._kind]
             row[describe(effect).first_parameter] = off + self._sign * self._size * typical

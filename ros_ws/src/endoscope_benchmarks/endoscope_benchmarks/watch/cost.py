@@ -3,16 +3,13 @@
 import argparse
 import os
 import tempfile
-import time
 from pathlib import Path
 
 import numpy as np
 
-from endoscope_benchmarks.bench import spread
-from endoscope_benchmarks.graph import SIMULATED, Composition
+from endoscope_benchmarks.graph import Composition, Pace, least_cores
 from endoscope_core.signals.command_file import write_command_file
 from endoscope_nodes.graph import ALL_NODES
-from endoscope_nodes.nodes.simulation_clock import SimulationClockNode
 
 TARGET_CORES = 0.1
 _LEARNT_S = 45.0
@@ -27,7 +24,9 @@ def run(args: argparse.Namespace) -> int:
         for watched, costs in cores.items():
             costs.append(_in_lock_step(watched, args.seconds))
         for watched in cores:
-            print(f'{"watched" if watched else "not watched"}: {_in_real_time(watched, args)}')
+            print(
+                f'{"watched" if watched else "not watched"}: {_in_real_time(watched, args.seconds)}'
+            )
     without, with_it = min(cores[False]), min(cores[True])
     print(
         f'{100 * without:.1f} % of a core without, {100 * with_it:.1f} % with it: watching costs '
@@ -49,44 +48,17 @@ def _overrides(folder: str, watched: bool, seconds: float) -> dict[str, dict[str
 
 
 def _in_lock_step(watched: bool, seconds: float) -> float:
-    """Least CPU time of all nodes in one process in a second of motion.
-
-    The same ticks with the same messages, however busy the machine is.
-    """
+    """Least CPU time of all nodes in one process in a second of motion."""
     with tempfile.TemporaryDirectory() as folder:
-        overrides = _overrides(folder, watched, _LEARNT_S + seconds)
-        graph = Composition((*ALL_NODES, SimulationClockNode), overrides, SIMULATED)
-        try:
-            graph.advance(0.5)
-            graph.enable()
-            graph.advance(_LEARNT_S)
-            costs = []
-            for _ in range(round(seconds)):
-                cpu = time.process_time()
-                graph.advance(1.0)
-                costs.append(time.process_time() - cpu)
-            # What else a machine does only adds, by its caches.
-            return min(costs)
-        finally:
-            graph.close()
+        return least_cores(_overrides(folder, watched, _LEARNT_S + seconds), _LEARNT_S, seconds)
 
 
-def _in_real_time(watched: bool, args: argparse.Namespace) -> str:
+def _in_real_time(watched: bool, seconds: float) -> Pace:
     with tempfile.TemporaryDirectory() as folder:
-        graph = Composition(ALL_NODES, _overrides(folder, watched, _LEARNT_S + args.seconds))
+        graph = Composition(ALL_NODES, _overrides(folder, watched, _LEARNT_S + seconds))
         try:
             graph.enable()
             graph.serve(_LEARNT_S)
-            ticker = graph.runtime.ticker
-            latency = graph.kept(graph.node('motor_driver').latency_ns)
-            ticks, missed, cpu = ticker.ticks, ticker.missed, time.process_time()
-            graph.serve(args.seconds)
-            cpu = time.process_time() - cpu
-            ticks, missed = ticker.ticks - ticks, ticker.missed - missed
+            return graph.kept_pace(seconds)
         finally:
             graph.close()
-    middle, late, _ = (1e-6 * each for each in spread(latency))
-    return (
-        f'{100 * ticks / (ticks + missed):.2f} % of ticks, command to motor {middle:.2f} ms '
-        f'(p99 {late:.2f}), {cpu / args.seconds:.2f} cores'
-    )

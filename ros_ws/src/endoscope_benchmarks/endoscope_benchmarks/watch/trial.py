@@ -4,7 +4,6 @@ import argparse
 import math
 import time
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from scipy.stats import gumbel_r
@@ -12,8 +11,8 @@ from scipy.stats import gumbel_r
 from endoscope_benchmarks.bench import (
     chosen,
     keep_row,
-    kept_rows,
     report,
+    rows_so_far,
     side_by_side,
     table_head,
     table_row,
@@ -33,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
     # Nothing is told where thresholds are derived, so that each rig is judged to its end.
     thresholds = dict.fromkeys(map(str, Part), math.inf) if args.derive else THRESHOLDS
     kinds = () if args.derive else tuple(chosen('change', args.only, KINDS))
-    rows = {(row.kind, row.seed): row for row in _kept(args.json)}
+    rows = {(row.kind, row.seed): row for row in rows_so_far(args.json, Watched)}
     cases = _in_turn([(kind, seed) for seed in args.seeds for kind in kinds], args.nominal)
     calls = [(*case, thresholds) for case in cases if case not in rows]
     ends = time.monotonic() + args.within
@@ -53,10 +52,6 @@ def run(args: argparse.Namespace) -> int:
     else:
         _print(done, kinds)
     return 0
-
-
-def _kept(file: Path | None) -> list[Watched]:
-    return kept_rows(file, Watched) if file is not None and file.exists() else []
 
 
 def _in_turn(changes: Sequence[tuple[str, int]], nominal: Sequence[int]) -> list[tuple[str, int]]:

@@ -220,8 +220,8 @@ def _tried(
     best, with_it, without = parameters, followed(parameters), missed(desired)
     ways = [_with_less(joint) for joint in parameters]
     for k in range(max(map(len, ways))):
-        # The joints are tried side by side; one that has no way left plays its last again.
-        tried = tuple(own[min(k, len(own) - 1)] for own in ways)
+        # The joints are tried side by side; one that has no way left plays its best again.
+        tried = tuple(own[k] if k < len(own) else b for own, b in zip(ways, best, strict=True))
         error = followed(tried)
         better = error < with_it
         best = tuple(t if b else c for t, b, c in zip(tried, better, best, strict=True))
@@ -238,13 +238,13 @@ def _tried(
 
 
 def _with_less(joint: PhysicalParameters) -> list[PhysicalParameters]:
-    """A joint without each of its effects, its functions, and all of them; as it is with none."""
+    """A joint without each of its effects, its functions, and all of them."""
     functions = tuple(entry for entry in joint.added if not isinstance(entry, EffectSpec))
     parts: list[Added] = [(e,) for e in joint.added if isinstance(e, EffectSpec)]
     parts += [functions] if functions else []
     kept = [tuple(e for e in joint.added if e not in part) for part in parts]
     kept += [()] if len(parts) > 1 else []
-    return [replace(joint, added=each) for each in kept] or [joint]
+    return [replace(joint, added=each) for each in kept]
 
 
 def _tip(plant: PlantDescription, limits: MotorLimits, command: Array) -> Array:

@@ -29,7 +29,7 @@ def depends_on_other(term: Term) -> bool:
 
 def stands_beside(tried: JointSearch, angle: Array, left_out: tuple[str, ...], jobs: int) -> bool:
     """Whether a search would find the same beside the other joint's angle (N,) in rad."""
-    found = [tried.found, *(level.best for level in tried.levels)]
+    found = [tried.found, *(level.best for level in tried.levels if level.found)]
     if any(depends_on_other(term) for one in found for term in one.terms):
         return False
     return all(_gain_beside(level, angle, left_out, jobs) < _least(level) for level in tried.levels)

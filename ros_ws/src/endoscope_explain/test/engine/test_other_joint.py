@@ -9,7 +9,8 @@ from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.layout import IN_OTHER_JOINT
 from endoscope_explain.fit.nominal import with_references
 from endoscope_explain.observe.observation import observe
-from endoscope_explain.search.levels import search
+from endoscope_explain.search.levels import JointSearch, Level, search
+from endoscope_explain.search.null_rigs import NO_DETECTABLE_GAIN
 from endoscope_explain.search.other_joint import stands_beside
 
 
@@ -40,3 +41,9 @@ def test_only_what_depends_on_the_other_joint_is_searched_again(record, effect, 
     tried, moved = searched(record, effect)
     assert tried.levels
     assert stands_beside(tried, moved, (), 2) is stands
+
+
+def test_a_level_at_which_nothing_could_be_tried_leaves_it_open(record):
+    tried, moved = searched(record)
+    without = JointSearch(tried.nominal, (Level(tried.nominal, (), NO_DETECTABLE_GAIN),))
+    assert not stands_beside(without, moved, (), 2)
