@@ -20,6 +20,7 @@ from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.signals import hold, move, sequence
 from endoscope_core.signals.command_file import JOINTS, CommandTable, write_command_file
 from endoscope_explain.investigation.motions import Motion
+from endoscope_nodes.client import motion_player
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import GraphError
 from endoscope_nodes.client.motion_player import MotionPlayer
@@ -35,7 +36,7 @@ STOPS_S = 0.6
 
 @pytest.fixture(scope='module')
 def graph(tmp_path_factory):
-    with OperatedGraph(tmp_path_factory.mktemp('attacked')) as graph:
+    with OperatedGraph(tmp_path_factory.mktemp('attacked'), tick_rate=250) as graph:
         yield graph
 
 
@@ -186,7 +187,9 @@ def test_a_dead_man_who_lets_go_stops_the_motion(graph, motion, tmp_path, strang
 
 
 @pytest.mark.parametrize('name', ['console', 'supervisor'])
-def test_a_node_that_dies_ends_the_motion(graph, motion, tmp_path, name):
+def test_a_node_that_dies_ends_the_motion(graph, motion, tmp_path, monkeypatch, name):
+    # What it then asks in vain is waited for less long, so that the test is not.
+    monkeypatch.setattr(motion_player, 'PATIENCE_S', 5.0)
     moved = []
 
     def dies():
@@ -218,6 +221,8 @@ def test_a_program_that_is_killed_moves_nothing_on(graph, tmp_path):
     finally:
         program.kill()
         program.communicate()
+    # It could not do so itself.
+    graph.nodes['recorder'].stop()
     assert graph.state == 'ENABLED'
     assert stands_still(graph)
     log = json.loads((tmp_path / 'out' / 'log.json').read_text())

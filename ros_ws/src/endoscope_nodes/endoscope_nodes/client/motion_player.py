@@ -22,6 +22,8 @@ RECORDER_NODE = 'recorder'
 PATIENCE_S = 20.0
 NEXT_WORD_S = 1.5
 """The console says once a second how far it is; a word from before means nothing."""
+LET_GO_S = 0.2
+"""Before the clutch is held, in several words, so that each node has heard one."""
 REST_S = 0.5
 """After a motion, so that what it leaves behind is recorded."""
 COMPENSATOR = 'compensator'
@@ -188,7 +190,15 @@ class MotionPlayer:
             return
         client = self._client
         publisher = client.node.create_publisher(Joy, names.MASTER_CLUTCH, EVENT)
+
+        def let_go() -> bool:
+            publisher.publish(clutch_message(False, client.graph_ns))
+            return False
+
         try:
+            client.wait_until(lambda: publisher.get_subscription_count() > 0, PATIENCE_S)
+            # Where two have held it, nodes doubt every hand until it is let go of.
+            client.wait_until(let_go, LET_GO_S)
             yield lambda: publisher.publish(clutch_message(True, client.graph_ns))
         finally:
             publisher.publish(clutch_message(False, client.graph_ns))
