@@ -162,16 +162,36 @@ def take(page: Page) -> None:
 
 def enable(page: Page) -> None:
     """Take the controls and enable, up to where the hand is waited for."""
-    take(page)
-    if page.locator('#state').inner_text() != 'ENABLED':
+    if page.locator('#operator').inner_text() != 'you':
+        take(page)
+    hold_enable(page)
+
+
+def hold_enable(page: Page) -> None:
+    """Hold Enable or Resume; anew where it came too soon, or where a stall has undone it."""
+    end = time.monotonic() + _LONGEST_S
+    button = page.locator('#enable')
+    while True:
+        until(page, lambda: button.is_enabled() or _is_enabled(page), 'Enable')
+        if _is_enabled(page):
+            return
+        assert time.monotonic() < end, f'refused: {page.locator("#answer").inner_text()}'
         hold(page, 'enable')
-    shows(page, 'state', 'ENABLED')
+        soon = time.monotonic() + _GRIP_S
+        while time.monotonic() < soon and not _is_enabled(page):
+            page.wait_for_timeout(20)
+
+
+def _is_enabled(page: Page) -> bool:
+    return page.locator('#state').inner_text() == 'ENABLED'
 
 
 def grip(page: Page, press: Callable[[], None], release: Callable[[], None], done) -> None:
     """Take hold until something has come true; anew where a stall of the machine has ended it."""
     end = time.monotonic() + _LONGEST_S
     while time.monotonic() < end:
+        # A machine that stood still for 2 s has lost him the controls.
+        enable(page)
         until(page, lambda: page.locator('body').get_attribute('data-ready') == 'true', 'readiness')
         press()
         slot = time.monotonic() + _GRIP_S

@@ -8,6 +8,7 @@ from browsed_console import (
     enable,
     grip,
     hold,
+    hold_enable,
     shows,
     take,
     until,
@@ -125,7 +126,7 @@ def lead(console, page):
         expect(page.locator(f'#{name}')).to_be_disabled()
     page.get_by_role('button', name='Take the controls').click()
     shows(page, 'next', re.compile('^Hold Enable for 1 s'))
-    hold(page, 'enable')
+    hold_enable(page)
     shows(page, 'next', re.compile('^Hold Calibrate for 1 s.* hold Space and an arrow key'))
     begin = console.now_ns
     press, release = press_keys(page, 'Space', 'ArrowRight')
@@ -220,8 +221,7 @@ def test_a_gamepad_holds_and_lets_go_when_unplugged(console, browser):
         page.wait_for_timeout(HELD_MS)
         shows(page, 'state', 'PAUSED')
         page.evaluate('pad.buttons[9].pressed = false')
-        hold(page, 'enable')
-        shows(page, 'state', 'ENABLED')
+        hold_enable(page)
         begin = console.now_ns
         press, release = (
             lambda on=on: page.evaluate(f'pad.buttons[5].pressed = {on} === 1; pad.axes[0] = {on}')
@@ -331,8 +331,7 @@ def test_pause_is_always_live_for_who_operates(console, page):
     page.click('#pause')
     shows(page, 'state', 'PAUSED')
     shows(page, 'next', re.compile('^Paused, position held. Hold Resume'))
-    hold(page, 'enable')
-    shows(page, 'state', 'ENABLED')
+    hold_enable(page)
     page.click('#tab-see')
     page.keyboard.press('Escape')
     shows(page, 'state', 'PAUSED')

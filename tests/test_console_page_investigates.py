@@ -4,7 +4,7 @@ import json
 import re
 
 import pytest
-from browsed_console import BrowsedConsole, grip, hold, shows, take, until
+from browsed_console import BrowsedConsole, grip, hold_enable, shows, take, until
 from playwright.sync_api import expect
 
 from endoscope_core.physics import PlantDescription, save_plant
@@ -75,7 +75,7 @@ def test_an_investigation_asks_plays_under_the_hand_and_stops(running, page):
     expect(dialog).to_be_visible()
     page.click('#consent [value=go]')
     expect(page.locator('#tab-operate')).to_have_attribute('aria-selected', 'true')
-    hold(page, 'enable')
+    hold_enable(page)
     begin = running.now_ns
     grip(
         page,
@@ -102,8 +102,7 @@ def test_a_plant_is_adopted_and_undone(page):
     adopt.click()
     shows(page, 'adopt-answer', re.compile(r'^Refused \(no session\): no motion session is open'))
     page.click('#tab-operate')
-    hold(page, 'enable')
-    shows(page, 'state', 'ENABLED')
+    hold_enable(page)
     page.click('#tab-explain')
     adopt.click()
     expect(in_force).to_have_text(re.compile(r'^plant \w+ adopted$'))

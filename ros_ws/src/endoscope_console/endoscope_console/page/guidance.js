@@ -5,7 +5,8 @@ import { SILENT_STATE_S } from './alarms.js';
 /** Reasons of the dead-man in words; what is not listed is said as it comes. */
 const REASONS = {
   released: 'let go', silent: 'no sign of the hand for 0.1 s', late: 'frames came late', order: 'frames out of order',
-  malformed: 'a malformed frame', flood: 'too many frames', hidden: 'page hidden', unfocused: 'page not in front',
+  malformed: 'a malformed frame', flood: 'too many frames', hidden: 'this page was hidden',
+  unfocused: 'this page is not in front',
   closed: 'page closed', lost: 'controls lost', unplugged: 'gamepad unplugged', state: 'not enabled',
   calibration: 'calibration', source: 'master follows something else', blind: 'picture too old',
   stalled: 'the server was not run in time', 'hands on': 'let go first',

@@ -72,7 +72,7 @@ class MotionPlayer:
         self._consent = consent
         self._hold_to_play = hold_to_play
         self._withdrawn = withdrawn
-        self.prepares = False  # between consent and the moment in which a person may enable
+        self.prepares = False  # once consented to, whether it may not be enabled yet
         self._tries = False  # whether a plant is in force that was given for one motion
 
     def play(self, motion: PlayedMotion, file: Path, bag: Path, plant: str = '') -> None:
@@ -86,9 +86,10 @@ class MotionPlayer:
         """
         client = self._client
         self._look()
+        # From before the consent on: there is no moment after it in which one may enable.
+        self.prepares = True
         if not self._consent(f'Play this motion: {motion.words}?'):
             raise NotPlayedError('the motion was not wanted')
-        self.prepares = True
         self._look()
         with ExitStack() as after:
             if client.state == 'ENABLED':
