@@ -24,6 +24,11 @@ BOUND = RIG.motors.speed * TICK_S * 1.001
 STILL = 0.003
 
 
+def ticks(seconds):
+    """Ticks that the graph has in some time, s."""
+    return round(seconds * TICK_RATE)
+
+
 class Sender:
     """Publishes JointStates from the test, as somebody else's program does."""
 
@@ -60,7 +65,7 @@ class ForeignMaster(Sender):
         return [start + self.way for start in self.start]
 
     def tick(self, position=None, **changes):
-        if self.sent % 50 == 0 and self.clutch is not None:
+        if self.sent % ticks(0.1) == 0 and self.clutch is not None:
             self.clutch_publisher.publish(Joy(buttons=[self.clutch]))
             self._graph.advance(TICK_S)
         self.sent += 1
@@ -72,8 +77,8 @@ class ForeignMaster(Sender):
         self.clutch_publisher.publish(Joy(buttons=[clutch]))
         self._graph.advance(TICK_S)
 
-    def move(self, ticks, speed=0.5):
-        for _ in range(ticks):
+    def move(self, seconds, speed=0.5):
+        for _ in range(ticks(seconds)):
             self.way += TICK_S * speed * self.towards
             self.tick(velocity=[speed * self.towards] * 2)
 

@@ -46,7 +46,7 @@ def test_feed_forward_and_feedback_reduce_the_error_of_60_sin_t(tmp_path, motion
     overrides = tube_of_size(tmp_path, 65, 903)
     overrides |= {'compensator': {'mode': 'none'}, 'controller': {'active': False}}
     overrides['console'] = {'command_file': str(motion_file)}
-    with SimulatedGraph(overrides=overrides, tick_rate=250) as graph:
+    with SimulatedGraph(overrides=overrides, tick_rate=100) as graph:
         streams = [graph.listen(t) for t in ('slave/servo_jp', 'slave/measured_js')]
         graph.enable()
         graph.calibrate()

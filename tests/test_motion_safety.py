@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import commanded_graph
 import numpy as np
 import pytest
-from commanded_graph import BOUND, RIG, STILL, TICK_S, Handle, Moved, run
+from commanded_graph import BOUND, RIG, STILL, TICK_S, Handle, Moved, run, ticks
 from sensor_msgs.msg import JointState, Joy
 from simulated_graph import TICK_RATE, SimulatedGraph
 
@@ -122,23 +122,23 @@ def test_state_commands_out_of_place_change_nothing():
     ],
 )
 def test_a_bad_command_is_refused_counted_and_changes_nothing(foreign, master, changes, reason):
-    master.move(200)
+    master.move(0.4)
     moved = Moved(foreign)
     before = foreign.nodes['compensator'].gate.refused[reason]
     master.tick(**changes)
     assert moved.goals == []
-    master.move(100)
+    master.move(0.2)
     foreign.advance(0.05)
     assert foreign.state == 'ENABLED'
     assert foreign.nodes['compensator'].gate.refused[reason] == before + 1
-    assert len(moved.goals) == 100
+    assert len(moved.goals) == ticks(0.2)
     assert moved.largest_step < TICK_S
 
 
 def test_the_order_of_the_joints_does_not_matter(foreign, master):
-    master.move(200)
+    master.move(0.4)
     moved = Moved(foreign)
-    master.move(20)
+    master.move(0.04)
     x, y = master.angle
     # Onwards: at a reversal the feed-forward crosses the backlash.
     master.tick([y + master.towards * TICK_S, x], name=['bend_y', 'bend_x'])
@@ -147,9 +147,9 @@ def test_the_order_of_the_joints_does_not_matter(foreign, master):
 
 
 def test_a_step_is_refused_and_ends_the_session(foreign, master):
-    master.move(200)
+    master.move(0.4)
     moved = Moved(foreign)
-    for _ in range(300):
+    for _ in range(ticks(0.6)):
         master.tick([1.4 * master.towards] * 2)
     assert foreign.state == 'FAULT'
     assert foreign.nodes['compensator'].gate.refused['too fast']
@@ -161,7 +161,7 @@ def test_a_step_is_refused_and_ends_the_session(foreign, master):
 def test_a_first_command_far_from_the_measured_pose_moves_nothing(foreign, master):
     moved = Moved(foreign)
     master.way = 0.3
-    for _ in range(300):
+    for _ in range(ticks(0.6)):
         master.tick()
     assert moved.goals == []
     assert moved.of_shafts < STILL
@@ -171,7 +171,7 @@ def test_stamps_that_run_ahead_stretch_no_allowance(foreign, master):
     """The allowance of speed is spent once, not by every message anew."""
     moved = Moved(foreign)
     speed = RIG.joints.speed
-    for k in range(200):
+    for k in range(ticks(0.4)):
         master.way = master.towards * min(1.0, abs(master.way) + 0.02 * speed)
         master.tick(ahead_ns=k * 20_000_000)
     assert moved.largest_step < BOUND
@@ -180,25 +180,25 @@ def test_stamps_that_run_ahead_stretch_no_allowance(foreign, master):
 
 def test_enabling_anew_clears_what_a_stamp_from_the_future_left(foreign, master):
     master.tick(ahead_ns=10_000_000_000)
-    master.move(50)
+    master.move(0.1)
     assert foreign.state == 'ENABLED'
     foreign.command('disable')
     foreign.advance(0.2)
     foreign.enable()
     corrections = foreign.listen(CORRECTION)
     master.start, master.way = foreign.nodes['compensator']._pose.bending(), 0.0
-    master.move(600)
+    master.move(1.2)
     assert len(corrections) > 1.1 * TICK_RATE
     assert foreign.diagnostics['controller: feedback'][-1].message == 'in the loop'
 
 
 def test_a_velocity_that_belies_the_positions_moves_nothing(foreign, master):
-    master.move(100)
-    for _ in range(300):
+    master.move(0.2)
+    for _ in range(ticks(0.6)):
         master.tick(velocity=[0.0, 0.0])
     moved = Moved(foreign)
-    for k in range(500):
-        master.tick(velocity=[0.5 if k % 50 == 0 else 0.0] * 2)
+    for k in range(ticks(1.0)):
+        master.tick(velocity=[0.5 if k % ticks(0.1) == 0 else 0.0] * 2)
     assert moved.largest_step < TICK_S
     assert moved.of_tip < 0.02
 
@@ -209,22 +209,22 @@ def test_nothing_moves_unless_the_clutch_is_held(foreign, master, clutch):
     master.clutch = clutch
     moved = Moved(foreign)
     before = foreign.nodes['compensator'].gate.refused['clutch not held']
-    master.move(100)
+    master.move(0.2)
     assert moved.goals == []
-    assert foreign.nodes['compensator'].gate.refused['clutch not held'] == before + 100
+    assert foreign.nodes['compensator'].gate.refused['clutch not held'] == before + ticks(0.2)
 
 
 def test_a_clutch_that_falls_silent_is_released(foreign, master):
     moved = Moved(foreign)
-    master.move(20)
+    master.move(0.04)
     master.clutch = None
-    master.move(600)
+    master.move(1.2)
     assert 0.34 * TICK_RATE <= len(moved.goals) <= 0.38 * TICK_RATE
     assert foreign.state == 'ENABLED'
 
 
 def test_commands_that_end_with_the_clutch_held_end_the_session(foreign, master):
-    master.move(300)
+    master.move(0.6)
     moved = Moved(foreign)
     foreign.advance(0.3)
     assert foreign.state == 'FAULT'
@@ -237,7 +237,7 @@ def test_commands_that_end_with_the_clutch_held_end_the_session(foreign, master)
 def test_nothing_moves_unless_enabled(foreign, master):
     assert foreign.command('disable') == 'DISABLED'
     moved = Moved(foreign)
-    master.move(100)
+    master.move(0.2)
     assert moved.goals == []
     assert moved.of_shafts < STILL
 
@@ -262,7 +262,7 @@ def test_after_a_rest_of_two_minutes_all_that_moves_the_slave_is_obeyed():
 
 
 def test_home_is_said_to_be_reached_where_it_is(foreign, master):
-    master.move(600)
+    master.move(1.2)
     master.hold(0)
     foreign.advance(0.2)
     foreign.nodes['motor_driver']._device.set_torque(False)
@@ -280,7 +280,7 @@ def test_home_is_said_to_be_reached_where_it_is(foreign, master):
 def test_motors_that_stand_still_under_commands_are_a_fault(foreign, master):
     foreign.nodes['motor_driver']._device.set_torque(False)
     for _ in range(30):
-        master.move(10)
+        master.move(0.02)
         if foreign.state == 'FAULT':
             break
     # 13 counts are told within 0.1 s, which is looked at each 0.04 s; 0.3 s are waited for.
@@ -301,9 +301,9 @@ def test_commands_that_are_refused_while_the_clutch_is_held_are_a_fault_and_said
     foreign.enable()
     assert moved.goals == []
     master.way = 0.0
-    master.move(100)
+    master.move(0.2)
     assert foreign.state == 'ENABLED'
-    assert len(moved.goals) > 50
+    assert len(moved.goals) > ticks(0.1)
 
 
 # ---- the handle

@@ -9,7 +9,7 @@ import time
 import commanded_graph
 import numpy as np
 import pytest
-from commanded_graph import BOUND, STILL, TICK_S, Handle, Moved, Sender, run
+from commanded_graph import BOUND, STILL, TICK_S, Handle, Moved, Sender, run, ticks
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from rclpy.time import Time
@@ -80,7 +80,7 @@ def test_two_senders_of_a_motion_topic_are_a_fault_that_names_both():
             (MOTOR_COMMAND, MOTORS, 0.5),
         ):
             rival = Sender(graph, topic, names)
-            for _ in range(100):
+            for _ in range(ticks(0.2)):
                 rival.send([value] * 2)
                 graph.advance(TICK_S)
             assert graph.state == 'FAULT'
@@ -108,7 +108,7 @@ def test_two_senders_of_a_motion_topic_are_a_fault_that_names_both():
 )
 def test_a_command_that_outlives_its_sender_is_not_obeyed(foreign, master, topic, names, reader):
     """It waits for a node that is not run, and only the session's own sender is left by then."""
-    master.move(100)
+    master.move(0.2)
     node = foreign.nodes[reader]
     gates = {
         'motor_driver': lambda: node.motion.gate,
@@ -117,7 +117,7 @@ def test_a_command_that_outlives_its_sender_is_not_obeyed(foreign, master, topic
     }
     gate = gates[reader]()
     # The motor driver judges what came in its next turn.
-    foreign.advance(0.002)
+    foreign.advance(TICK_S)
     pose = node.motion.goal if reader == 'motor_driver' else master.angle
     obeyed, refused = gate.accepted, gate.refused[Refusal.SENDER]
     message = JointState(name=list(names), position=[x + 1e-3 for x in pose])
@@ -137,7 +137,7 @@ def test_a_command_that_outlives_its_sender_is_not_obeyed(foreign, master, topic
 
 def test_a_heartbeat_that_outlives_its_sender_opens_nothing(foreign, master):
     """A rival of the supervisor has come and gone while the motor driver was not run."""
-    master.move(100)
+    master.move(0.2)
     node = foreign.nodes['motor_driver']
     leave_behind(foreign, node, MOTION_SESSION, Header(frame_id='session-99'), EVENT)
     entered = set()
@@ -150,7 +150,7 @@ def test_a_heartbeat_that_outlives_its_sender_opens_nothing(foreign, master):
 
 
 def test_a_clutch_that_outlives_its_sender_is_not_held_before_it_is_let_go_of(foreign, master):
-    master.move(20)
+    master.move(0.04)
     master.hold(0)
     clutches = [foreign.nodes[name]._clutch for name in ('compensator', 'console')]
     foreign.advance(0.1)
