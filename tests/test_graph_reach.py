@@ -8,10 +8,11 @@ from commanded_graph import Sender
 from simulated_graph import TICK_RATE, SimulatedGraph
 from tubes import tube_of_size
 
-from endoscope_core.control import BendingRange, bending_range
+from endoscope_core.control import bending_range
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.physics import load_plant
 from endoscope_core.rig import shipped_rig
+from endoscope_core.safety import BendingRange
 from endoscope_nodes.names import (
     CALIBRATION_COMMAND,
     JOINTS,

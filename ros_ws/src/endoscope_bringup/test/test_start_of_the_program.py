@@ -75,6 +75,16 @@ def test_help_loads_nothing_heavy(command):
     assert shown.stderr == 'loaded:\n'
 
 
+def test_what_operates_a_graph_loads_nothing_that_computes():
+    code = (
+        'import sys\n'
+        'from endoscope_bringup.operating import actions, listening\n'
+        "print(*sorted({'numba', 'scipy', 'sklearn'} & set(sys.modules)))\n"
+    )
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
 def test_the_version_is_that_of_the_package():
     shown = start('--version')
     assert re.fullmatch(r'endoscope \d+\.\d+\.\d+\n', shown.stdout)

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from endoscope_core.control import AdoptionCode, AdoptionError, adopted_plant, plant_hash
+from endoscope_core.control import AdoptionError, adopted_plant, plant_hash
 from endoscope_core.physics import EffectSpec, PlantDescription
 from endoscope_core.physics.plant_file import plant_as_text
 from endoscope_core.rig import load_rig
+from endoscope_core.safety import AdoptionCode
 from endoscope_core.signals.command_file import JOINTS
 
 RIG = load_rig()

@@ -12,7 +12,6 @@ from endoscope_core.classifier.classification import Classifier, UnseenTensionEr
 from endoscope_core.control import (
     ADAPTIVE_PHYSICAL,
     AdaptiveBacklashController,
-    BendingRange,
     DesiredMotion,
     Feedforward,
     FeedforwardLaw,
@@ -33,6 +32,7 @@ from endoscope_core.identification.plant_fit import plants_of_calibration
 from endoscope_core.metrics import tracking_rmse, width_at_mid_height
 from endoscope_core.physics import PlantDescription, PlantSimulator, SensorModel
 from endoscope_core.rig import shipped_rig
+from endoscope_core.safety import BendingRange
 from endoscope_core.signals import Signal
 
 TICK = 1.0e-3

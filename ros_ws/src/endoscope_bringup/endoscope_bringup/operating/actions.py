@@ -14,7 +14,7 @@ from typing import Any
 
 from endoscope_bringup.operating.status import calibration_in_words, status_of
 from endoscope_bringup.progress_line import ShareBar
-from endoscope_core.control import ranges_in_words
+from endoscope_core.safety import ranges_in_words
 from endoscope_nodes import names
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import GraphError

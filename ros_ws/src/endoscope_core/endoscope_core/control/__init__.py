@@ -7,7 +7,6 @@ from endoscope_core.control.adaptive_backlash import (
 )
 from endoscope_core.control.adopted_plant import (
     AdoptedPlant,
-    AdoptionCode,
     AdoptionError,
     adopted_plant,
     plant_hash,
@@ -15,13 +14,7 @@ from endoscope_core.control.adopted_plant import (
 from endoscope_core.control.desired_motion import DesiredMotion
 from endoscope_core.control.feedforward import Feedforward, FeedforwardLaw, FeedforwardSettings
 from endoscope_core.control.handle import Handle, HandleRefusal, HandleSettings
-from endoscope_core.control.internal_model import (
-    BendingRange,
-    PhysicalParameters,
-    bending_range,
-    keep_within,
-    ranges_in_words,
-)
+from endoscope_core.control.internal_model import PhysicalParameters, bending_range
 from endoscope_core.control.limits import MotorLimits, shipped_limits
 from endoscope_core.control.physical_inverse import AdaptivePhysicalInverse, PhysicalInverse
 from endoscope_core.control.plant_learning import PlantLearning, PlantLearningSettings
@@ -39,9 +32,7 @@ __all__ = [
     'AdaptiveBacklashSettings',
     'AdaptivePhysicalInverse',
     'AdoptedPlant',
-    'AdoptionCode',
     'AdoptionError',
-    'BendingRange',
     'DesiredMotion',
     'Feedforward',
     'FeedforwardLaw',
@@ -60,8 +51,6 @@ __all__ = [
     'TrackerMeasurement',
     'adopted_plant',
     'bending_range',
-    'keep_within',
     'plant_hash',
-    'ranges_in_words',
     'shipped_limits',
 ]

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,6 @@ from endoscope_core.choices import PHYSICAL
 from endoscope_core.control.feedforward import Feedforward, FeedforwardLaw, FeedforwardSettings
 from endoscope_core.control.internal_model import (
     Added,
-    BendingRange,
     PhysicalParameters,
     added_to,
     bending_range,
@@ -34,6 +32,8 @@ from endoscope_core.physics.packing import without_functions
 from endoscope_core.physics.plant_file import plant_from_mapping
 from endoscope_core.physics.simulator import TICK, simulate
 from endoscope_core.rig import Rig, digest
+from endoscope_core.safety.adoption_code import AdoptionCode
+from endoscope_core.safety.bending_range import BendingRange
 from endoscope_core.schema import parse_yaml
 from endoscope_core.signals import periodic_signal
 
@@ -43,24 +43,6 @@ _INVERTED = (Stage.ACTUATOR, Stage.TRANSMISSION, Stage.JOINT)
 _CYCLE_S = 2.0 * math.pi
 
 Array = NDArray[np.float64]
-
-
-class AdoptionCode(StrEnum):
-    """Why a plant is not put into force, or the one before not again."""
-
-    NONE = ''
-    NOT_A_PLANT = 'not_a_plant'
-    OTHER_JOINTS = 'other_joints'
-    NOT_INVERTIBLE = 'not_invertible'
-    BEYOND_RANGE = 'beyond_range'
-    MOVING = 'moving'
-    BUSY = 'busy'
-    FAULT = 'fault'
-    NOT_MEASURED = 'not_measured'
-    NO_SESSION = 'no_session'
-    OTHER_SESSION = 'other_session'
-    OTHER_SENDER = 'other_sender'
-    NOTHING_TO_UNDO = 'nothing_to_undo'
 
 
 class AdoptionError(EndoscopeError):

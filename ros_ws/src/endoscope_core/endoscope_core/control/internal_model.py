@@ -9,7 +9,6 @@ Mathematical Models of Hysteresis, 1991, ch. I).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -41,6 +40,7 @@ from endoscope_core.physics.layout import (
 from endoscope_core.physics.packing import pack, rest_state
 from endoscope_core.physics.sheath import MOTOR_END
 from endoscope_core.physics.simulator import simulate
+from endoscope_core.safety.bending_range import BendingRange
 
 PROFILE = 'friction_profile'
 Array = NDArray[np.float64]
@@ -358,42 +358,6 @@ class InternalModel:
         m = self._limits
         _go_through_angles(self._model, self._trial, self._tried, path, m.travel, m.tension)
         return path.tolist()
-
-
-@dataclass(frozen=True)
-class BendingRange:
-    """Smallest and largest bending angle, rad."""
-
-    low: float
-    high: float
-
-    def keep(self, angle: float, velocity: float) -> tuple[float, float]:
-        """A desired angle within the range, and its velocity: zero where the angle is cut."""
-        within = min(self.high, max(self.low, angle))
-        return within, velocity if within == angle else 0.0
-
-
-def ranges_in_words(ranges: Sequence[BendingRange], joints: Sequence[str]) -> str:
-    """How far the joints of these names can be bent, in degrees, as a sentence without its stop."""
-    said = ', '.join(
-        f'{joint} from {math.degrees(r.low):.0f} to {math.degrees(r.high):.0f} deg'
-        for joint, r in zip(joints, ranges, strict=True)
-    )
-    return f'this tube can be bent: {said}'
-
-
-def keep_within(
-    ranges: Sequence[BendingRange], angle: Sequence[float], velocity: Sequence[float]
-) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Desired angles (rad) and velocities (rad/s) of J joints, cut where a tube's range ends.
-
-    Nothing is cut where no range is known; where no velocities are given, none are returned.
-    """
-    if not ranges:
-        return tuple(angle), tuple(velocity)
-    speeds = velocity or (0.0,) * len(angle)
-    kept = [r.keep(a, v) for r, a, v in zip(ranges, angle, speeds, strict=True)]
-    return tuple(a for a, _ in kept), tuple(v for _, v in kept) if velocity else ()
 
 
 def bending_range(

@@ -15,13 +15,14 @@ from endoscope_core.choices import (
     PHYSICAL,
     SELECTIONS,
 )
-from endoscope_core.control import BendingRange, FeedforwardLaw, PhysicalParameters
+from endoscope_core.control import FeedforwardLaw, PhysicalParameters
 from endoscope_core.errors import FileError, InputError
 from endoscope_core.identification.class_parameters import (
     load_class_parameters,
     parameters_for_class,
 )
 from endoscope_core.identification.updated_table import LawParameters, UpdatedTable
+from endoscope_core.safety import BendingRange
 
 
 @dataclass(frozen=True)

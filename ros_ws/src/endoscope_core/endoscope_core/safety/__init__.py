@@ -1,5 +1,7 @@
 """What stands between a command and motion: states, sessions, gates, guards and the shaper."""
 
+from endoscope_core.safety.adoption_code import AdoptionCode
+from endoscope_core.safety.bending_range import BendingRange, keep_within, ranges_in_words
 from endoscope_core.safety.command_gate import CommandGate, CommandLimits, Refusal
 from endoscope_core.safety.guards import StandingStill, TensionGuard
 from endoscope_core.safety.motion_session import MotionSession
@@ -13,7 +15,9 @@ from endoscope_core.safety.operating_state import (
 from endoscope_core.safety.shaft_motion import ShaftMotion
 
 __all__ = [
+    'AdoptionCode',
     'Answer',
+    'BendingRange',
     'CommandGate',
     'CommandLimits',
     'MotionLimits',
@@ -26,4 +30,6 @@ __all__ = [
     'StandingStill',
     'StateCommand',
     'TensionGuard',
+    'keep_within',
+    'ranges_in_words',
 ]

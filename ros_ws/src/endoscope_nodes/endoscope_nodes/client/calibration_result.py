@@ -11,9 +11,10 @@ from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 
 from endoscope_core.calibration import words_of
-from endoscope_core.control import BendingRange, PhysicalParameters, bending_range
+from endoscope_core.control import PhysicalParameters, bending_range
 from endoscope_core.control.internal_model import PROFILE
 from endoscope_core.identification.law_choice import CalibrationFindings
+from endoscope_core.safety import BendingRange
 from endoscope_nodes.names import JOINTS, WIRES
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, diagnostic_array, status
 

@@ -10,8 +10,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
 
-from endoscope_core.control import AdoptionCode, BendingRange
 from endoscope_core.errors import FileError
+from endoscope_core.safety import AdoptionCode, BendingRange
 from endoscope_nodes import names
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import PATIENCE_S, GraphError

@@ -9,26 +9,26 @@ from rclpy.parameter import Parameter
 from endoscope_core.choices import ADAPTIVE_PHYSICAL, BY_ADOPTED, BY_CLASS, MODES
 from endoscope_core.control import (
     AdoptedPlant,
-    AdoptionCode,
     AdoptionError,
-    BendingRange,
     DesiredMotion,
     Feedforward,
     FeedforwardLaw,
     FeedforwardSettings,
     MotorLimits,
-    keep_within,
-    ranges_in_words,
 )
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.identification.law_choice import CalibrationFindings, LawChoice
 from endoscope_core.safety import (
+    AdoptionCode,
+    BendingRange,
     CommandGate,
     CommandLimits,
     MotionLimits,
     MotionShaper,
     Refusal,
     StandingStill,
+    keep_within,
+    ranges_in_words,
 )
 from endoscope_nodes import names
 from endoscope_nodes.client.calibration_result import findings_of, is_of_no_class

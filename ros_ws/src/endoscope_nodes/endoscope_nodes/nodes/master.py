@@ -9,16 +9,15 @@ from rclpy.publisher import Publisher
 from sensor_msgs.msg import Joy
 
 from endoscope_core.choices import FOLLOW_THE_HANDLE
-from endoscope_core.control import (
+from endoscope_core.control import Handle, HandleRefusal, HandleSettings
+from endoscope_core.errors import FileError
+from endoscope_core.safety import (
     BendingRange,
-    Handle,
-    HandleRefusal,
-    HandleSettings,
+    MotionLimits,
+    MotionShaper,
     keep_within,
     ranges_in_words,
 )
-from endoscope_core.errors import FileError
-from endoscope_core.safety import MotionLimits, MotionShaper
 from endoscope_core.safety.motion_session import STALL_NS
 from endoscope_nodes import names
 from endoscope_nodes.client.calibration_result import findings_of, is_of_no_class

@@ -7,13 +7,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from diagnostic_msgs.msg import DiagnosticArray
 
 from endoscope_core.choices import BY_ADOPTED, PHYSICAL
-from endoscope_core.control import (
-    AdoptedPlant,
-    AdoptionCode,
-    AdoptionError,
-    BendingRange,
-    adopted_plant,
-)
+from endoscope_core.control import AdoptedPlant, AdoptionError, adopted_plant
+from endoscope_core.safety import AdoptionCode, BendingRange
 from endoscope_nodes import names
 from endoscope_nodes.client.order_feedback import OrderState
 from endoscope_nodes.client.plant_adoption import AdoptionRequest, PlantInForce
