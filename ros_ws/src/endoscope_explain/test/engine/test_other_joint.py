@@ -14,9 +14,11 @@ from endoscope_explain.search.null_rigs import NO_DETECTABLE_GAIN
 from endoscope_explain.search.other_joint import stands_beside
 
 
-def searched(record, *effects):
-    """The search on `bend_y` as if `bend_x` stood still, and how `bend_x` moved."""
-    recording = record(PlantDescription(effects=effects), 12.0)
+@pytest.fixture(scope='module', params=['load_cell_gain', 'cross_coupling'])
+def searched(record, request):
+    """An effect, its search on `bend_y` as if `bend_x` stood still, and how `bend_x` moved."""
+    effect = EffectSpec(request.param, 'bend_y', {})
+    recording = record(PlantDescription(effects=(effect,)), 12.0)
     plant = PlantDescription()
     observations = observe(recording, plant)
     _, references = with_references(recording, observations, plant, 0.15, 2)
@@ -27,23 +29,16 @@ def searched(record, *effects):
         dataclasses.replace(f, model=dataclasses.replace(f.model, observation=still))
         for f in (fitted, described)
     ]
-    return search([tuple(pair)], 2, 1), moved
+    return request.param, search([tuple(pair)], 2, 1), moved
 
 
-@pytest.mark.parametrize(
-    ('effect', 'stands'),
-    [
-        (EffectSpec('load_cell_gain', 'bend_y', {}), True),
-        (EffectSpec('cross_coupling', 'bend_y', {}), False),
-    ],
-)
-def test_only_what_depends_on_the_other_joint_is_searched_again(record, effect, stands):
-    tried, moved = searched(record, effect)
+def test_only_what_depends_on_the_other_joint_is_searched_again(searched):
+    effect, tried, moved = searched
     assert tried.levels
-    assert stands_beside(tried, moved, (), 2) is stands
+    assert stands_beside(tried, moved, (), 2) is (effect == 'load_cell_gain')
 
 
-def test_a_level_at_which_nothing_could_be_tried_leaves_it_open(record):
-    tried, moved = searched(record)
+def test_a_level_at_which_nothing_could_be_tried_leaves_it_open(searched):
+    _, tried, moved = searched
     without = JointSearch(tried.nominal, (Level(tried.nominal, (), NO_DETECTABLE_GAIN),))
     assert not stands_beside(without, moved, (), 2)
