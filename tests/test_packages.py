@@ -115,10 +115,13 @@ def test_colcon_takes_all_packages_as_ament_python() -> None:
 
 
 @each_package
-def test_everything_in_the_package_is_installed(package: Path, tmp_path: Path) -> None:
+def test_everything_in_the_package_and_its_licence_are_installed(
+    package: Path, tmp_path: Path
+) -> None:
     subprocess.run(
         [sys.executable, 'setup.py', '-q', 'egg_info', '--egg-base', str(tmp_path)]
-        + ['build_py', '--build-lib', str(tmp_path / 'lib')],
+        + ['build_py', '--build-lib', str(tmp_path / 'lib')]
+        + ['install_data', '--install-dir', str(tmp_path)],
         cwd=package,
         capture_output=True,
         text=True,
@@ -137,20 +140,8 @@ def test_everything_in_the_package_is_installed(package: Path, tmp_path: Path) -
     assert built == sources, (
         'a folder without __init__.py, or a suffix that setup.cfg does not ship'
     )
-
-
-@each_package
-def test_the_licence_is_installed(package: Path, tmp_path: Path) -> None:
-    subprocess.run(
-        [sys.executable, 'setup.py', '-q', 'egg_info', '--egg-base', str(tmp_path)]
-        + ['install_data', '--install-dir', str(tmp_path)],
-        cwd=package,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    installed = tmp_path / 'share' / package.name / 'LICENSE'
-    assert installed.read_text() == (WORKSPACE / 'LICENSE').read_text()
+    licence = tmp_path / 'share' / package.name / 'LICENSE'
+    assert licence.read_text() == (WORKSPACE / 'LICENSE').read_text()
 
 
 def test_one_version_is_named_everywhere() -> None:
