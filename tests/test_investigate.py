@@ -43,7 +43,12 @@ def graph(rig=None, plant=None, folder=None):
         save_plant(plant, folder / 'slave.yaml')
         overrides['motor_driver'] = {'plant_file': str(folder / 'slave.yaml')}
     return LiveGraph(
-        None, lock_step=True, overrides=overrides, rig=rig, nodes=(*NODES, RecorderNode)
+        None,
+        lock_step=True,
+        overrides=overrides,
+        rate=250,
+        rig=rig,
+        nodes=(*NODES, RecorderNode),
     )
 
 

@@ -67,7 +67,7 @@ def of_another_rig(tmp_path_factory):
         timeouts=replace(shipped.timeouts, command=0.04),
     )
     bag = tmp_path_factory.mktemp('other') / 'bag'
-    with LiveGraph(bag, private_domain(), lock_step=True, overrides={}, rig=rig) as graph:
+    with LiveGraph(bag, private_domain(), lock_step=True, overrides={}, rate=250, rig=rig) as graph:
         graph.client.ask('enable')
         graph.set('console', source='motion', motion='periodic')
         graph.advance(2.2)
@@ -115,7 +115,7 @@ def test_a_motion_cut_out_of_a_session_is_consistent(recorded, tmp_path):
 def test_a_stop_is_replayed_as_the_driver_made_it(tmp_path):
     """Silent load cells end the session in the tick of a command, which is obeyed no more."""
     bag = tmp_path / 'bag'
-    with LiveGraph(bag, private_domain(), lock_step=True, overrides={}) as graph:
+    with LiveGraph(bag, private_domain(), lock_step=True, overrides={}, rate=250) as graph:
         graph.client.ask('enable')
         graph.set('console', source='motion', motion='periodic')
         graph.advance(1.5)
