@@ -87,12 +87,13 @@ def test_a_motion_is_played_through_a_plant_that_is_in_force_only_meanwhile(tmp_
             file = tmp_path / f'{name}.yaml'
             save_plant(plant, file)
             player = MotionPlayer(client, lambda words: True)
-            player.play(motion, csv, tmp_path / name, file.read_text())
+            player.play(motion, csv, tmp_path / name, file)
             off[name] = tracked(tmp_path / name).rmse
             assert read_parameter(client, 'compensator.mode').value == 'bouc_wen'
             assert read_parameter(client, 'compensator.selected_by').value == 'class'
+        (tmp_path / 'none.yaml').write_text('joints: {elbow: {}}')
         with pytest.raises(NotPlayedError, match='does not take the plant'):
-            player.play(motion, csv, tmp_path / 'none', 'joints: {elbow: {}}')
+            player.play(motion, csv, tmp_path / 'none', tmp_path / 'none.yaml')
         assert client.state != 'ENABLED'
     assert off['true'] < 0.7 * off['described']
 

@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 from commanded_graph import STILL, Moved, Sender
 from operated_graph import OperatedGraph
+from security_policy import NAMESPACE, allowed
 from sensor_msgs.msg import Joy
 from simulated_graph import SimulatedGraph
 from std_msgs.msg import Header
 
+from endoscope_bags import open_bag
 from endoscope_core.errors import NotPlayedError, RigStoppedError
 from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.signals import hold, move, sequence
@@ -205,7 +207,7 @@ def test_a_node_that_dies_ends_the_motion(graph, motion, tmp_path, monkeypatch, 
     assert stands_still(graph)
 
 
-def test_a_program_that_is_killed_moves_nothing_on(graph, tmp_path):
+def test_a_program_that_is_killed_moves_nothing_on_and_is_in_no_way(graph, motion, tmp_path):
     save_plant(PlantDescription(), tmp_path / 'plant.yaml')
     graph.command('disable')
     graph.advance(0.5)
@@ -218,6 +220,10 @@ def test_a_program_that_is_killed_moves_nothing_on(graph, tmp_path):
             assert program.poll() is None, program.communicate()
             assert time.monotonic() < end
             graph.pace()
+        of = 'investigate', NAMESPACE
+        published = graph.probe.get_publisher_names_and_types_by_node(*of)
+        heard = graph.probe.get_subscriber_names_and_types_by_node(*of)
+        called = graph.probe.get_client_names_and_types_by_node(*of)
     finally:
         program.kill()
         program.communicate()
@@ -227,6 +233,16 @@ def test_a_program_that_is_killed_moves_nothing_on(graph, tmp_path):
     assert stands_still(graph)
     log = json.loads((tmp_path / 'out' / 'log.json').read_text())
     assert [each['recorded'] for each in log['rounds']] == [False]
+
+    # The security policy allows what it does.
+    may, them = allowed(), ('investigate', 'operator', 'console_web')
+    assert {name for name, _ in published} <= may['investigate']['publish']
+    assert all({name for name, _ in heard} <= may[each]['subscribe'] for each in them)
+    assert {name for name, _ in called} <= may['investigate']['request']
+
+    # What it was recording is in nobody's way.
+    assert attacked(graph, motion, tmp_path, lambda: None) is None
+    assert open_bag(tmp_path / 'out' / 'bag_1').joint_state(SLAVE_COMMAND).stamp_ns.size
 
 
 @pytest.mark.parametrize('session', ['', 'session-99'])

@@ -212,7 +212,8 @@ def test_a_recording_is_begun_and_ended(graph, tmp_path):
     assert operate(graph, 'record', 'start') == (0, f'recording to {bag}')
     status, said = operate(graph, 'record', 'start')
     assert status == 1
-    assert said.startswith(f'record start: already recording to {bag}')
+    ends = '`endoscope operate record stop` ends that'
+    assert said.startswith(f'record start: already recording to {bag}: {ends}')
     assert f'recording to {bag}' in operate(graph, 'status')[1]
     status, said = operate(graph, 'record', 'stop')
     assert status == 0

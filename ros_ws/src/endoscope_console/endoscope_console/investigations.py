@@ -13,8 +13,9 @@ from endoscope_console.access import REPORTS
 from endoscope_console.background import Background
 from endoscope_console.explanations import PLANT_FILE, REPORT_FILE, Explanations
 from endoscope_core.errors import EndoscopeError, NotPlayedError, RigStoppedError
+from endoscope_core.investigation_folder import LOG
 
-_LOG, _PAGE = 'log.json', 'index.html'
+_PAGE = 'index.html'
 _ENDED = ('one_class_left', 'nothing_to_gain')
 """After these there is nothing to continue."""
 _TOLD = 5
@@ -31,12 +32,18 @@ class AskedMotion:
     duration: float  # in s
     file: Path
     bag: Path  # that it is recorded to
+    plant: Path | None  # that the compensator inverts meanwhile; None for no compensation
 
     @classmethod
     def of(cls, told: Mapping[str, Any]) -> 'AskedMotion':
         """Read it as the command writes it."""
         return cls(
-            told['words'], told['why'], told['duration'], Path(told['file']), Path(told['bag'])
+            told['words'],
+            told['why'],
+            told['duration'],
+            Path(told['file']),
+            Path(told['bag']),
+            Path(told['plant']) if told['plant'] else None,
         )
 
 
@@ -77,10 +84,10 @@ class Investigation:
         """Take from its folder how it has ended."""
         self.running, self.step, self.question = False, '', None
         try:
-            log = json.loads((self.folder / _LOG).read_text('utf-8'))
+            log = json.loads((self.folder / LOG).read_text('utf-8'))
             stopped, self.sentence = log['stopped'], log['words']
         except (OSError, ValueError, KeyError, TypeError) as error:
-            self.error = self.error or f'{self.folder / _LOG} is not the log of one: {error}'
+            self.error = self.error or f'{self.folder / LOG} is not the log of one: {error}'
             return
         self.goes_on = stopped not in _ENDED
         if (self.folder / _PAGE).is_file():
@@ -116,7 +123,7 @@ class Investigations:
         self._asking: asyncio.Task[None] | None = None
         self._questions = 0
         # Those that are there can be read again, and continued.
-        for file in sorted(folder.glob(f'*/{_LOG}'), key=lambda file: file.stat().st_mtime):
+        for file in sorted(folder.glob(f'*/{LOG}'), key=lambda file: file.stat().st_mtime):
             self._new(file.parent).look()
 
     def as_list(self) -> list[dict[str, Any]]:
@@ -148,7 +155,7 @@ class Investigations:
         one = self._all.get(name)
         if one is None or not one.goes_on:
             raise EndoscopeError(f'there is no investigation {name} that may be continued')
-        plant = json.loads((one.folder / _LOG).read_text('utf-8'))['plant']
+        plant = json.loads((one.folder / LOG).read_text('utf-8'))['plant']
         one.sentence = one.error = ''
         return self._start(one, Path(plant), rig, experiments, play)
 

@@ -146,8 +146,9 @@ class Playing:
                 lambda words: asyncio.run_coroutine_threadsafe(consented(words), loop).result(),
                 hold_to_play=True,
                 withdrawn=lambda: any(is_withdrawn() for is_withdrawn in begun),
+                plants=self._graph.plants,
             )
-            await self._ask(partial(player.play, motion, motion.file, motion.bag))
+            await self._ask(partial(player.play, motion, motion.file, motion.bag, motion.plant))
 
     def _has_ended(self, holder: Holder) -> None:
         holder.moves, self.investigates = '', False

@@ -2,11 +2,13 @@
 
 import dataclasses
 import json
+from functools import partial
 
 import numpy as np
 import pytest
 
 from endoscope_core.errors import InputError, NotPlayedError, RigStoppedError
+from endoscope_core.investigation_folder import LOG, held, is_left_behind
 from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
 from endoscope_core.physics.plant_file import load_plant, save_plant
 from endoscope_core.rig import shipped_rig
@@ -18,7 +20,7 @@ from endoscope_explain.investigation.investigation import (
     Investigation,
     investigate,
 )
-from endoscope_explain.investigation.log import LOG_JSON, LOG_MD, PLANT, Stop, begun
+from endoscope_explain.investigation.log import LOG_MD, PLANT, Stop, begun
 from endoscope_explain.investigation.motions import (
     Motion,
     MotionRefusedError,
@@ -80,7 +82,7 @@ def plant_file(tmp_path):
 
 
 def log_of(folder):
-    return json.loads((folder / LOG_JSON).read_text())
+    return json.loads((folder / LOG).read_text())
 
 
 def test_a_second_motion_tells_the_rivals_that_the_first_one_left(record, tmp_path, plant_file):
@@ -200,7 +202,7 @@ def test_a_comparison_that_nobody_wants_leaves_what_is_known(both, told):
     ((words, file, plant),) = asked
     assert file == 'held_out.csv'
     assert 'Held-out motion of bend_x and bend_y, 16 s' in words
-    assert plant == both.plant_file.read_text()
+    assert plant == both.plant_file
     assert 'not measured: the motion was not wanted' in (both.folder / LOG_MD).read_text()
 
 
@@ -217,6 +219,20 @@ def test_what_is_at_its_end_is_not_begun_again(both, told):
     assert investigate(both, no_rig, lambda bags: told).stopped is Stop.ONE_CLASS
     with pytest.raises(InputError, match='at its end: One class is left'):
         begun(both.folder, both.plant_file)
+
+
+def test_a_folder_is_one_programs_until_that_is_gone(both, stribeck_case):
+    left = partial(is_left_behind, both.folder / 'bag_1')
+    elsewhere = both.folder.parent
+    assert not left(elsewhere)
+    investigate(dataclasses.replace(both, experiments=0), no_rig, lambda bags: stribeck_case)
+    with held(both.folder):
+        with pytest.raises(InputError, match='another program investigates'), held(both.folder):
+            pass
+        assert not left(elsewhere)
+        # It holds this one itself.
+        assert left(both.folder)
+    assert left(elsewhere)
 
 
 def test_another_plant_or_a_folder_of_something_else_is_refused(both, tmp_path, stribeck_case):

@@ -57,5 +57,7 @@ REFUSAL, REFUSAL_CODE, REFUSED_NS = 'last refusal', 'refusal code', 'refused at 
 AWAITED = 'awaited'
 # What `recorder: events` says there: how many marks it has heard, and its last bag of an event.
 MARKS, LAST_EVENT = 'marks', 'last bag'
+# What `recorder: recording` says there while it records: where, and whether nobody asked for it.
+BAG, AUTOMATIC = 'bag', 'automatic'
 # What `console: commands` says there of a motion that it plays.
 FINISHED = 'finished'

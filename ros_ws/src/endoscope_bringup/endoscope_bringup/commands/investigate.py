@@ -85,16 +85,15 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_bringup.operating.actions import paused_when_interrupted
     from endoscope_bringup.operating.motions_by_lines import MotionsByLines
     from endoscope_core.errors import EndoscopeError
+    from endoscope_core.investigation_folder import held
     from endoscope_core.rig import load_rig
     from endoscope_explain.investigation import page
     from endoscope_explain.investigation.investigation import (
         Investigation,
-        Play,
         explain_together,
         investigate,
     )
     from endoscope_explain.investigation.log import PAGE, Log, Stop, begun
-    from endoscope_explain.investigation.tracking import PlayThrough
     from endoscope_nodes.client.motion_player import MotionPlayer
 
     if not (args.attended or args.lines or sys.stdin.isatty()):
@@ -104,28 +103,26 @@ def run(args: argparse.Namespace) -> int:
     begun(of.folder, of.plant_file)
     step = partial(print, file=sys.stderr, flush=True)
 
-    def investigated(
-        play: Play, say: Callable[[str], None], track: PlayThrough | None = None
-    ) -> Log:
+    def investigated(player: MotionPlayer | MotionsByLines, say: Callable[[str], None]) -> Log:
         return investigate(
             of,
-            play,
+            player.play,
             lambda bags: explain_together(bags, of, step),
-            track=track,
+            track=player.play,
             page=lambda log: page.page(log, of.folder),
             say=say,
         )
 
-    if args.lines:
-        lines = MotionsByLines(sys.stdout, sys.stdin)
-        log = investigated(lines.play, lines.say)
-        return 1 if log.stopped in (Stop.FAULT, Stop.INTERRUPTED) else 0
-    say = partial(print, flush=True)
-    consent = (lambda words: True) if args.attended else _asked
-    with _graph(args, rig) as client, paused_when_interrupted(client, moving=True):
-        player = MotionPlayer(client, consent)
-        log = investigated(player.play, say, player.play)
-    say(f'Page: {of.folder / PAGE}')
+    with held(of.folder):
+        if args.lines:
+            lines = MotionsByLines(sys.stdout, sys.stdin)
+            log = investigated(lines, lines.say)
+        else:
+            say = partial(print, flush=True)
+            consent = (lambda words: True) if args.attended else _asked
+            with _graph(args, rig) as client, paused_when_interrupted(client, moving=True):
+                log = investigated(MotionPlayer(client, consent), say)
+            say(f'Page: {of.folder / PAGE}')
     return 1 if log.stopped in (Stop.FAULT, Stop.INTERRUPTED) else 0
 
 

@@ -18,7 +18,7 @@ class MotionsByLines:
         """Say a sentence of the log."""
         self._write({'say': sentence})
 
-    def play(self, motion: Motion, file: Path, bag: Path) -> None:
+    def play(self, motion: Motion, file: Path, bag: Path, plant: Path | None = None) -> None:
         """Have a motion played and recorded; see `endoscope_nodes.client.motion_player`."""
         asked = {
             'words': motion.words,
@@ -26,6 +26,7 @@ class MotionsByLines:
             'duration': motion.duration,
             'file': str(file.absolute()),
             'bag': str(bag.absolute()),
+            'plant': '' if plant is None else str(plant.absolute()),
         }
         self._write({'play': asked})
         line = self._answers.readline()

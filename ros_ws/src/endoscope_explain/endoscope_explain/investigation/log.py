@@ -9,9 +9,10 @@ from pathlib import Path
 
 from endoscope_core.atomic_output import require_place, write_text
 from endoscope_core.errors import FileError, InputError
+from endoscope_core.investigation_folder import LOG
 from endoscope_core.schema import read
 
-LOG_JSON, LOG_MD, PAGE, PLANT = 'log.json', 'log.md', 'index.html', 'plant.yaml'
+LOG_MD, PAGE, PLANT = 'log.md', 'index.html', 'plant.yaml'
 COMMISSIONING = 'commissioning'
 SCHEMA = 1
 
@@ -132,7 +133,7 @@ class Log:
     def write(self, folder: Path) -> None:
         """Write it as data and in sentences."""
         text = json.dumps(asdict(self), indent=1, allow_nan=False)
-        write_text(folder / LOG_JSON, text + '\n')
+        write_text(folder / LOG, text + '\n')
         write_text(folder / LOG_MD, '\n'.join(in_sentences(self)) + '\n')
 
 
@@ -143,7 +144,7 @@ def begun(folder: Path, plant: Path) -> Log:
     has come to its end.
     """
     digest = hashlib.sha256(plant.read_bytes()).hexdigest()
-    file = folder / LOG_JSON
+    file = folder / LOG
     if not file.exists():
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise InputError(

@@ -33,8 +33,8 @@ SHARE = 0.5
 """Of the largest angle of the commissioning motion: what compensation adds to it stays within what
 the rig has been through."""
 
-PlayThrough = Callable[[Motion, Path, Path, str], None]
-"""Plays a motion, which a file holds, through the inverse of a plant, and records it to a bag."""
+PlayThrough = Callable[[Motion, Path, Path, Path], None]
+"""Plays a motion, which a file holds, to a bag, through the inverse of the plant of another."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def with_tracking(
     for by, file in (('described', plant_file), ('improved', folder / logs.PLANT)):
         bag = f'tracking_{by}_{1 + sum(1 for _ in folder.glob(f"tracking_{by}_*"))}'
         try:
-            play(motion, folder / FILE, folder / bag, file.read_text('utf-8'))
+            play(motion, folder / FILE, folder / bag, file)
         except NotPlayedError as error:
             return replace(log, tracking=(), untracked=str(error))
         rmse = math.degrees(tracked(folder / bag).rmse)

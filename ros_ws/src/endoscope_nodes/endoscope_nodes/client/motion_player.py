@@ -7,15 +7,21 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from sensor_msgs.msg import Joy
+from std_srvs.srv import Trigger
 
 from endoscope_core.choices import BY_ADOPTED
 from endoscope_core.errors import NotPlayedError, OutputError, RigStoppedError
+from endoscope_core.investigation_folder import is_left_behind
 from endoscope_nodes import names
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import MASTER, RECORDER, GraphError
 from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
 from endoscope_nodes.client.handle_sender import clutch_message
-from endoscope_nodes.client.plant_adoption import AdoptedPlants, RefusedAdoptionError
+from endoscope_nodes.client.plant_adoption import (
+    AdoptedPlants,
+    RefusedAdoptionError,
+    plant_text,
+)
 from endoscope_nodes.runtime.qos import EVENT
 
 RECORDER_NODE = 'recorder'
@@ -57,7 +63,10 @@ class MotionPlayer:
     A session is opened for a motion that somebody consents to, and ends with it. Whatever ends a
     motion before its end pauses the graph. The motion goes on only while the clutch is held: by the
     player, so that nothing moves on once its program is gone, or with `hold_to_play` by a person,
-    who enables the slave, too. What is `withdrawn` after consent is not played.
+    who enables the slave, too. What is `withdrawn` after consent is not played. A recording that an
+    investigation has left behind whose program is gone, or that nobody asked for, makes room for
+    its own; any other goes on. `plants` are those of whoever asks for plants by this client
+    already.
     """
 
     def __init__(
@@ -67,19 +76,21 @@ class MotionPlayer:
         *,
         hold_to_play: bool = False,
         withdrawn: Callable[[], bool] = lambda: False,
+        plants: AdoptedPlants | None = None,
     ) -> None:
         self._client = client
         self._consent = consent
         self._hold_to_play = hold_to_play
         self._withdrawn = withdrawn
+        self._plants = plants or AdoptedPlants(client)
         self.prepares = False  # once consented to, whether it may not be enabled yet
         self._tries = False  # whether a plant is in force that was given for one motion
 
-    def play(self, motion: PlayedMotion, file: Path, bag: Path, plant: str = '') -> None:
+    def play(self, motion: PlayedMotion, file: Path, bag: Path, plant: Path | None = None) -> None:
         """Play a motion, which a file holds, and record it to a bag that does not exist.
 
-        With the text of a plant file the compensator inverts that plant meanwhile; what was in
-        force before is so again afterwards.
+        With a plant file the compensator inverts that plant meanwhile; what was in force before is
+        so again afterwards.
 
         RigStoppedError if the rig stops on the way, NotPlayedError if nobody consents, a person
         ends it or the plant is refused, GraphError if the graph does not do what it is asked for.
@@ -105,8 +116,8 @@ class MotionPlayer:
                 if not self._hold_to_play:
                     client.ask_and_see('enable', PATIENCE_S)
                 self._require_enabled()
-                if plant:
-                    self._through(plant, lambda: self._played(motion, file))
+                if plant is not None:
+                    self._through(plant_text(plant), lambda: self._played(motion, file))
                 else:
                     self._played(motion, file)
             except BaseException:
@@ -150,7 +161,7 @@ class MotionPlayer:
 
     def _through(self, plant: str, played: Callable[[], None]) -> None:
         """Do something while the compensator inverts a plant."""
-        plants = AdoptedPlants(self._client)
+        plants = self._plants
         try:
             self._session()
             plants.adopt(plant, PATIENCE_S)
@@ -175,9 +186,15 @@ class MotionPlayer:
         client = self._client
         client.wait_until(lambda: RECORDER in client.health, PATIENCE_S)
         said = client.health.get(RECORDER)
-        if said is not None and said.message == 'recording automatically':
-            client.trigger(names.RECORDER_STOP, PATIENCE_S)
         before = read_parameter(client, f'{RECORDER_NODE}.bag', PATIENCE_S).value
+        if said is not None and names.BAG in said.values:
+            left = is_left_behind(Path(said.values[names.BAG]), bag.parent)
+            if left:
+                # The next recording would have the name of this one.
+                before = ''
+            if left or said.values.get(names.AUTOMATIC) == 'True':
+                # Whether it is whole is nothing that this motion depends on.
+                client.call(Trigger, names.RECORDER_STOP, Trigger.Request(), PATIENCE_S)
         after.callback(set_parameters, client, RECORDER_NODE, {'bag': before})
         set_parameters(client, RECORDER_NODE, {'bag': str(bag.absolute())})
         client.trigger(names.RECORDER_START, PATIENCE_S)

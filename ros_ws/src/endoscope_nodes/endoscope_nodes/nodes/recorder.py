@@ -27,6 +27,8 @@ from endoscope_bags.topic import QosProfile
 from endoscope_core.atomic_output import with_final_names
 from endoscope_core.errors import nearest
 from endoscope_nodes.names import (
+    AUTOMATIC,
+    BAG,
     MOTION_SESSION,
     OPERATING_STATE,
     RECORDER_START,
@@ -155,7 +157,8 @@ class RecorderNode(EndoscopeNode):
         """Begin a recording and return where it goes; BagError if one is under way already."""
         if self._session is not None:
             there = with_final_names(str(self._session.path))
-            raise BagError(f'already recording to {there}; stop that first')
+            ends = self.operate('record stop')
+            raise BagError(f'already recording to {there}: `{ends}` ends that')
         path = Path(new_bag() if self._unasked else self._bag or new_bag())
         now_ns = self.ticker.now_ns()
         # What came before is no part of it, but what is in force.
@@ -395,7 +398,8 @@ class RecorderNode(EndoscopeNode):
             return OK, 'not recording', {}
         report = self._session.report()
         values: dict[str, object] = {
-            'bag': with_final_names(str(report.path)),
+            BAG: with_final_names(str(report.path)),
+            AUTOMATIC: self._unasked,
             'messages': report.message_count,
             'lost': report.lost_count,
         }
