@@ -145,8 +145,19 @@ def test_one_is_played_explained_and_its_plant_adopted_and_undone(running, page)
     page.does(pressed=False)
     assert rig.client.state == 'DISABLED'
     assert rig.setting('compensator.mode') == 'bouc_wen'
+
+    # What the plant is good for is seen by a motion through either plant, held in the same way.
+    plays(rig, page, name)
+    assert page.state['adopted']['words'] != 'no plant has been adopted'
+    holds(rig, page, lambda: not told(page, name)['plays'])
+    page.does(pressed=False)
+    assert rig.setting('compensator.mode') == 'bouc_wen'
+    asked = question(rig, page, name)
+    assert asked['words'].startswith('Play this motion: Held-out motion of bend_x and bend_y')
+    assert page.order('consent', question=asked['id'], go=False)['ok']
     it = ended(rig, page, name)
     assert it['sentence'], it
+    assert it['sentences'][-1] == 'Tracking was not measured: the motion was not wanted.'
     assert any(sentence.startswith('Explained in') for sentence in it['sentences'])
     with urllib.request.urlopen(rig.server.address + it['report']) as answer:
         assert 'Commissioning of bend_x' in answer.read().decode()
