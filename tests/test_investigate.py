@@ -88,7 +88,7 @@ def test_a_motion_is_played_through_a_plant_that_is_in_force_only_meanwhile(tmp_
             save_plant(plant, file)
             player = MotionPlayer(client, lambda words: True)
             player.play(motion, csv, tmp_path / name, file)
-            off[name] = tracked(tmp_path / name).rmse
+            off[name] = tracked(tmp_path / name, csv).rmse
             assert read_parameter(client, 'compensator.mode').value == 'bouc_wen'
             assert read_parameter(client, 'compensator.selected_by').value == 'class'
         (tmp_path / 'none.yaml').write_text('joints: {elbow: {}}')

@@ -15,12 +15,19 @@ from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import hold, move, sequence
 from endoscope_core.signals.command_file import JOINTS, CommandTable, read_command_file
 from endoscope_explain.audit import audit_recording
-from endoscope_explain.explanation import Verdict
+from endoscope_explain.explanation import Estimate, Verdict
 from endoscope_explain.investigation.investigation import (
     Investigation,
     investigate,
 )
-from endoscope_explain.investigation.log import LOG_MD, PLANT, Stop, begun
+from endoscope_explain.investigation.log import (
+    LOG_MD,
+    PLANT,
+    Stop,
+    Tracking,
+    begun,
+    tracking,
+)
 from endoscope_explain.investigation.motions import (
     Motion,
     MotionRefusedError,
@@ -187,6 +194,22 @@ def test_numbers_that_an_effect_may_stand_for_are_asked_about(both, told):
     (name,) = log.last_answer.names
     assert (name.id, name.joint, name.rivals) == ('other numbers', 'bend_x', instead['bend_x'])
     assert log.stopped is not Stop.ONE_CLASS
+
+
+def test_an_end_says_what_stays_open_and_what_an_error_of_the_tip_includes(both, told):
+    (effect,) = told.effects
+    first = effect.definition.parameters[0].name
+    open_ = {**effect.parameters, first: Estimate(0.5, 0.1, 2.0, '-')}
+    wide = dataclasses.replace(told, effects=(dataclasses.replace(effect, parameters=open_),))
+    dropped = dataclasses.replace(both, experiments=0)
+    log = investigate(dropped, no_rig, lambda bags: wide)
+    assert log.stopped is Stop.USED_UP
+    assert 'How strong stribeck_friction is stays open: rise 0.5 (0.1 to 2)' in log.words
+    seen = dataclasses.replace(log, tracking=(Tracking('described', '', 1.0),) * 2)
+    assert 'tracker' not in tracking(seen)
+    names = (dataclasses.replace(log.last_answer.names[0], id='tracker_bias'),)
+    answer = dataclasses.replace(log.last_answer, names=names)
+    assert 'so that tracker_bias counts as an error' in tracking(seen.with_last(answer=answer))
 
 
 def test_a_comparison_that_nobody_wants_leaves_what_is_known(both, told):

@@ -179,6 +179,8 @@ class _Running:
         answer = self.log.last_answer
         rivals = [name for name in answer.names if name.rivals] if answer else []
         left = ''.join(f' {r.id} is not told from {" or ".join(r.rivals)}.' for r in rivals[:1])
+        wide = [name for name in answer.names if name.wide] if answer else []
+        left += ''.join(f' How strong {w.id} is stays open: {w.strength}.' for w in wide)
         count = len(self.log.whole)
         after = f'after {count} motions' if count > 1 else 'after one motion'
         unnamed = answer is not None and answer.verdict == Verdict.UNKNOWN_PHYSICS
@@ -210,7 +212,7 @@ def answer_of(case: ExplainedCase, seconds: float) -> Answer:
         max((each.ratio for each in fit[name].values()), default=None) if name in fit else None
         for name in ('nominal', 'augmented')
     ]
-    names = [Name(e.id, e.joint, e.alternatives, _strength(e)) for e in case.effects]
+    names = [Name(e.id, e.joint, e.alternatives, _strength(e), is_wide(e)) for e in case.effects]
     names += [
         Name(NUMBERS, joint, rivals, '') for joint, rivals in case.explanation.instead.items()
     ]

@@ -10,6 +10,8 @@ from pathlib import Path
 from endoscope_core.atomic_output import require_place, write_text
 from endoscope_core.errors import FileError, InputError
 from endoscope_core.investigation_folder import LOG
+from endoscope_core.physics.effects import KNOWN
+from endoscope_core.physics.hooks import LINKS, TRACKER
 from endoscope_core.schema import read
 
 LOG_MD, PAGE, PLANT = 'log.md', 'index.html', 'plant.yaml'
@@ -46,6 +48,7 @@ class Name:
     joint: str
     rivals: tuple[str, ...]  # that the recordings do not tell from it, nearest first
     strength: str  # its first number with its 90 % interval, in words
+    wide: bool = False  # whether that is known by no more than its order of magnitude
 
 
 @dataclass(frozen=True)
@@ -217,10 +220,18 @@ def tracking(log: Log) -> str:
     if not log.tracking:
         return ''
     described, improved = (each.rmse_deg for each in log.tracking)
+    answer = log.last_answer
+    names = {name.id for name in answer.names} if answer else set()
+    read = sorted(names & KNOWN.keys() & {effect.id for effect, _ in LINKS[TRACKER.name]})
     return (
         'On a motion that is among no experiments the tip is off by '
         f'{described:.2g} deg (rms) where the described plant is inverted, '
         f'and by {improved:.2g} deg where the improved one is.'
+    ) + (
+        f' Both are as the tracker reads the tip, so that {" and ".join(read)} counts as an error '
+        'of it.'
+        if read
+        else ''
     )
 
 

@@ -14,7 +14,7 @@ from endoscope_explain.investigation.log import (
     times,
     tracking,
 )
-from endoscope_explain.investigation.tracking import tracked
+from endoscope_explain.investigation.tracking import FILE, tracked
 from endoscope_pages import Curve, Plot, figure_html, html_table, render_page
 
 COLOURS = ('actual', 'wanted')
@@ -70,7 +70,7 @@ def _figure(file: Path) -> str:
 
 def _tracking(log: Log, folder: Path) -> str:
     """What was asked for, and what the tip did by either plant, a plot a joint."""
-    of = {each.by: tracked(folder / each.bag) for each in log.tracking}
+    of = {each.by: tracked(folder / each.bag, folder / FILE) for each in log.tracking}
     plots = []
     for k, joint in enumerate(JOINTS):
         wanted = next(iter(of.values()))

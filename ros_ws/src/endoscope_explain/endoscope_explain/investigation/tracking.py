@@ -14,7 +14,12 @@ from endoscope_core.metrics import tracking_rmse
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.rig import Rig
 from endoscope_core.signals import non_periodic_signal
-from endoscope_core.signals.command_file import JOINTS, CommandTable, write_command_file
+from endoscope_core.signals.command_file import (
+    JOINTS,
+    CommandTable,
+    read_command_file,
+    write_command_file,
+)
 from endoscope_explain.design import SAMPLE_S, as_played
 from endoscope_explain.investigation import log as logs
 from endoscope_explain.investigation.log import Log, Tracking
@@ -41,7 +46,7 @@ PlayThrough = Callable[[Motion, Path, Path, Path], None]
 class Tracked:
     """A motion as it was asked for and as the tip made it."""
 
-    time: Array  # (N,), s
+    time: Array  # (N,), s since the motion began
     desired: Array  # (N, J), rad
     tip: Array  # (N, J), rad
 
@@ -81,22 +86,29 @@ def with_tracking(
             play(motion, folder / FILE, folder / bag, file)
         except NotPlayedError as error:
             return replace(log, tracking=(), untracked=str(error))
-        rmse = math.degrees(tracked(folder / bag).rmse)
+        rmse = math.degrees(tracked(folder / bag, folder / FILE).rmse)
         found = (*found, Tracking(by, bag, rmse))
     return replace(log, tracking=found, untracked='')
 
 
-def tracked(bag: Path) -> Tracked:
-    """What a bag has of a motion: from its first to its last desired angle, where the tip is known.
+def tracked(bag: Path, file: Path) -> Tracked:
+    """What a bag has of a motion that a file asks for, by the time of the file.
 
     BagError if it cannot be read.
     """
-    opened = open_bag(bag)
-    desired = opened.joint_state(DESIRED).select(JOINTS)
-    tip = opened.joint_state(BENDING).select(JOINTS)
-    begin, end = desired.stamp_ns[0], desired.stamp_ns[-1]
-    inside = (tip.stamp_ns >= begin) & (tip.stamp_ns <= end)
-    time = 1e-9 * (tip.stamp_ns[inside] - begin)
-    asked = desired.require('position')
-    columns = [np.interp(time, 1e-9 * (desired.stamp_ns - begin), column) for column in asked.T]
-    return Tracked(time, np.stack(columns, axis=1), tip.require('position')[inside])
+    opened, table = open_bag(bag), read_command_file(file)
+    stream, tip = (opened.joint_state(topic).select(JOINTS) for topic in (DESIRED, BENDING))
+    stamp_s = 1e-9 * (stream.stamp_ns - stream.stamp_ns[0])
+    columns = stream.require('position').T
+
+    def desired(time: Array) -> Array:
+        return np.stack([np.interp(time, stamp_s, column) for column in columns], axis=1)
+
+    # The way to the beginning of a motion takes as long as it takes.
+    spare = max(0.0, stamp_s[-1] - table.time[-1])
+    begins = np.arange(0.0, spare + SAMPLE_S, SAMPLE_S)
+    off = [tracking_rmse(table.angle, desired(table.time + begin)) for begin in begins]
+    begin = float(begins[np.argmin(off)])
+    since = 1e-9 * (tip.stamp_ns - stream.stamp_ns[0]) - begin
+    inside = (since >= 0.0) & (since <= stamp_s[-1] - begin)
+    return Tracked(since[inside], desired(since[inside] + begin), tip.require('position')[inside])
