@@ -248,7 +248,7 @@ def test_a_folder_is_one_programs_until_that_is_gone(both, stribeck_case):
     left = partial(is_left_behind, both.folder / 'bag_1')
     elsewhere = both.folder.parent
     assert not left(elsewhere)
-    investigate(dataclasses.replace(both, experiments=0), no_rig, lambda bags: stribeck_case)
+    log = investigate(dataclasses.replace(both, experiments=0), no_rig, lambda bags: stribeck_case)
     with held(both.folder):
         with pytest.raises(InputError, match='another program investigates'), held(both.folder):
             pass
@@ -256,6 +256,8 @@ def test_a_folder_is_one_programs_until_that_is_gone(both, stribeck_case):
         # It holds this one itself.
         assert left(both.folder)
     assert left(elsewhere)
+    dataclasses.replace(log.with_last(recorded=False), stopped=None).write(both.folder)
+    assert begun(both.folder, both.plant_file).rounds[-1].ended == 'the program was killed.'
 
 
 def test_another_plant_or_a_folder_of_something_else_is_refused(both, tmp_path, stribeck_case):

@@ -163,7 +163,10 @@ def begun(folder: Path, plant: Path) -> Log:
         )
     if log.stopped is not None and log.stopped not in GOES_ON:
         raise InputError(f'{folder} is at its end: {log.words} Name another folder')
-    return replace(log, stopped=None, words='')
+    log = replace(log, stopped=None, words='')
+    if log.rounds and not (log.rounds[-1].recorded or log.rounds[-1].ended):
+        return log.with_last(ended='the program was killed.')
+    return log
 
 
 def _read(file: Path) -> Log:
