@@ -30,8 +30,8 @@ TRACKER = 'em_tracker: tracker'
 LATENCY = 0.03
 # Causes of the faults so far and when they were found, in ns, for whoever reads the bag.
 FAULTS = []
-STALLS = ('stood still for', 'was not run')
-"""What a node says that a busy machine did not run for 0.1 s, with which it ends the session."""
+STALLS = ('stood still for', 'was not run', 'motor/measured_js has been silent')
+"""What is said where a busy machine ran a node too late, and ends the session."""
 TRIALS = 20
 
 
@@ -257,6 +257,8 @@ def blind(rig, name, begin, diagnosis, end):
         begun = time.monotonic()
         begin()
         graph.says(TRACKER, diagnosis)
+        # What was published before may be on its way.
+        graph.serve(0.1)
         last = graph.bendings[-1][0]
         count = len(graph.bendings)
         graph.serve(0.3)
@@ -319,8 +321,8 @@ def test_moving_wires_are_not_tared_and_a_bent_tip_is_not_registered(rig):
             graph.serve(0.05)
         tared = graph.call('load_cells', 'tare')
         registered = graph.call('em_tracker', 'register_straight')
-        # Where this machine stalled meanwhile, the slave stood and is tried again.
-        stood = graph.state != 'ENABLED'
+        # Where this machine stalled meanwhile, the slave stood or readings are missing: once more.
+        stood = graph.state != 'ENABLED' or 'readings of the tip' in registered.message
     assert not tared.success
     assert 'the wires move' in tared.message
     assert not registered.success
