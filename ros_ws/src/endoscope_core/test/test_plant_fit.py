@@ -40,6 +40,17 @@ def test_three_seconds_of_two_tensions_show_plant_and_tip(seed, bend, unevenness
     assert fit_plant(COMMAND, tension, gear=GEAR) == fit
 
 
+@pytest.mark.parametrize('share', [0.5, 1.6])
+def test_wires_that_have_crept_or_were_tightened_hide_nothing(share):
+    plant = in_tube(random_instrument(np.random.default_rng(5)), 1.0, 0.1)
+    name, joint = next(iter(plant.joints.items()))
+    loose = replace(joint, pretension=share * joint.pretension)
+    truth, tension, bending = recorded(replace(plant, joints={name: loose}), 5)
+    fit = fit_plant(COMMAND, tension, gear=GEAR)
+    assert fit.parameters.joint.pretension == pytest.approx(truth.pretension, rel=0.03)
+    assert tip_missed(fit, bending) < np.deg2rad(1.0)
+
+
 def test_the_gear_is_that_of_the_rig():
     plant = PlantDescription(joints={'bend_x': JointParameters()})
     made = simulate(plant, 0.6 * COMMAND[:, None])

@@ -22,14 +22,15 @@ Array = NDArray[np.float64]
 
 FITTED = {
     'capstan_exponent': 1.0,
-    'pretension': 0.05,
+    'pretension': 0.5,
     'wire_stiffness': 0.1,
     'joint_stiffness': 0.1,
     'joint_friction': 0.1,
     'joint_presliding': 0.15,
 }
 """What is fitted, and the standard deviation of its logarithm from instrument to instrument in
-tubes of one bend."""
+tubes of one bend; of the pretension, what hours of work make of it: wires creep, and are tightened
+again by hand."""
 
 TENSION_SCALE = 0.05
 BENDING_SCALE = float(np.deg2rad(0.5))
