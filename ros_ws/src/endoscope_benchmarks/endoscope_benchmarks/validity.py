@@ -2,7 +2,7 @@
 
 import argparse
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -20,6 +20,7 @@ from endoscope_benchmarks.bench import (
     side_by_side,
     table_head,
     table_row,
+    today_and_machine,
 )
 from endoscope_benchmarks.concealed import motions
 from endoscope_benchmarks.papers.tracking_trial import (
@@ -134,9 +135,11 @@ def run(args: argparse.Namespace) -> int:
             if args.json:
                 keep_row(args.json, row)
         report(f'{done} of {len(calls)}: {call[0]}, seed {call[1]}')
-    print(table(list(rows.values()), causes))
+    wanted = [row for row in rows.values() if row.seed in args.seeds]
+    print(today_and_machine())
+    print(table(wanted, causes))
     if args.picture:
-        write_text(args.picture, picture(list(rows.values()), causes))
+        write_text(args.picture, picture(wanted, causes))
     return 0
 
 
@@ -230,7 +233,8 @@ def table(rows: Sequence[Row], causes: Sequence[str]) -> str:
                 continue
             same = sum(row.class_deg == first[row.seed].class_deg for row in of)
             sizes = [row.size_deg for row in of if row.size_deg is not None]
-            errors = [f'{x:.1f}' for x in np.nanmean([row.error_deg for row in of], axis=0)]
+            means = [_mean(row.error_deg[k] for row in of) for k in range(len(SCHEMES))]
+            errors = ['-' if math.isnan(mean) else f'{mean:.1f}' for mean in means]
             size = f'{np.mean(sizes):.0f}' if sizes else '-'
             told = sum(row.told for row in of)
             lines.append(table_row(cause, hour, len(of), same, size, *errors, told))
@@ -246,23 +250,33 @@ def picture(rows: Sequence[Row], causes: Sequence[str]) -> str:
         for cause, plot in zip(causes, axes, strict=False):
             of_hour = partial(_of, rows, cause)
             for k, (name, (_, _, fresh)) in enumerate(SCHEMES.items()):
-                errors = [np.nanmean([row.error_deg[k] for row in of_hour(h)]) for h in HOURS]
+                errors = [_mean(row.error_deg[k] for row in of_hour(h)) for h in HOURS]
                 line = '-' if fresh or name == NONE else '--'
                 colour = 'C3' if 'class' in name else 'C0' if 'plant' in name else '0.5'
                 plot.plot(HOURS, errors, line, color=colour, label=name)
             for hour in HOURS:
                 share = np.mean([row.told for row in of_hour(hour)])
                 if share:
-                    plot.plot(hour, 0.0, '^', color='C1', alpha=share, clip_on=False)
+                    told = plot.plot(hour, 0.0, '^', color='C1', alpha=share, clip_on=False)
+                    told[0].set_label('watch tells' if share == 1.0 else '')
             plot.set_title(cause)
             plot.set_ylim(bottom=0.0)
-            plot.set_ylabel('rms error (deg)')
+            plot.tick_params(labelbottom=True)
         for plot in axes[len(causes) :]:
             plot.axis('off')
-        figure.axes[0].legend(ncols=2)
-        for plot in figure.axes[-2:]:
+        labelled = zip(*figure.axes[0].get_legend_handles_labels(), strict=True)
+        by_label = {label: handle for handle, label in labelled}
+        figure.legend(by_label.values(), by_label, loc='outside lower center', ncols=6)
+        for plot in axes[: len(causes)][-2:]:
             plot.set_xlabel('hours of work')
+        figure.supylabel('rms error of the tip (deg)')
         return svg(figure)
+
+
+def _mean(values: Iterable[float]) -> float:
+    """Mean of what is a number; NaN where nothing is."""
+    numbers = [value for value in values if not math.isnan(value)]
+    return float(np.mean(numbers)) if numbers else math.nan
 
 
 def _of(rows: Sequence[Row], cause: str, hour: float) -> list[Row]:
