@@ -41,7 +41,7 @@ class BrowsedConsole:
     def __init__(self, folder) -> None:
         self._folder = folder
         # What it leaves of a core is the browser's.
-        self.graph = OperatedGraph(folder, tick_rate=250)
+        self.graph = OperatedGraph(folder)
         self._goes_on = True
         self._thread = ThreadPoolExecutor(1)
         self._pacing = self._thread.submit(self._live)

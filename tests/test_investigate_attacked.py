@@ -38,7 +38,7 @@ STOPS_S = 0.6
 
 @pytest.fixture(scope='module')
 def graph(tmp_path_factory):
-    with OperatedGraph(tmp_path_factory.mktemp('attacked'), tick_rate=250) as graph:
+    with OperatedGraph(tmp_path_factory.mktemp('attacked')) as graph:
         yield graph
 
 
@@ -227,8 +227,6 @@ def test_a_program_that_is_killed_moves_nothing_on_and_is_in_no_way(graph, motio
     finally:
         program.kill()
         program.communicate()
-    # It could not do so itself.
-    graph.nodes['recorder'].stop()
     assert graph.state == 'ENABLED'
     assert stands_still(graph)
     log = json.loads((tmp_path / 'out' / 'log.json').read_text())

@@ -46,7 +46,7 @@ def watched(files):
         'motor_driver': {'plant_file': str(files / 'true.yaml')},
         'console': {'source': 'file', 'command_file': str(files / 'motion.csv')},
     }
-    with OperatedGraph(files, extra=(WatchNode,), tick_rate=250, **overrides) as graph:
+    with OperatedGraph(files, extra=(WatchNode,), **overrides) as graph:
         graph.enable()
         graph.advance(25.0)
         # A tracker that has lost its sensor is no other rig.

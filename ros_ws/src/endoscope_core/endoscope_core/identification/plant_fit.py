@@ -16,21 +16,24 @@ from threadpoolctl import threadpool_limits
 from endoscope_core.control.internal_model import PhysicalParameters
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import JointParameters, PlantDescription, simulate
+from endoscope_core.physics.effects import KNOWN
 from endoscope_core.physics.family import CENTRE, MOST_BENT, shipped_family
 
 Array = NDArray[np.float64]
 
+_RATE, _, _SPAN = KNOWN['pretension_loss'].parameters
+_LOSS_N = _RATE.typical * _SPAN.typical
 FITTED = {
     'capstan_exponent': 1.0,
-    'pretension': 0.5,
+    'pretension': -math.log1p(-_LOSS_N / JointParameters().pretension),
     'wire_stiffness': 0.1,
     'joint_stiffness': 0.1,
     'joint_friction': 0.1,
     'joint_presliding': 0.15,
 }
 """What is fitted, and the standard deviation of its logarithm from instrument to instrument in
-tubes of one bend; of the pretension, what hours of work make of it: wires creep, and are tightened
-again by hand."""
+tubes of one bend; of the pretension, which creeps and is tightened again by hand, that of the
+nominal rig after a typical loss."""
 
 TENSION_SCALE = 0.05
 BENDING_SCALE = float(np.deg2rad(0.5))
