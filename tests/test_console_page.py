@@ -27,6 +27,14 @@ window.pad = { connected: true, mapping: 'standard', index: 0, id: 'made up', ax
 window.plugged = true;
 Navigator.prototype.getGamepads = () => [window.plugged ? window.pad : null];
 """
+REPEATS = """
+Object.defineProperty(WebSocket.prototype, 'onmessage', { set(take) {
+  this.addEventListener('message', ({ data }) => {
+    if (String(data).includes('"ENGAGED"')) window.saidAgain = () => take({ data });
+    take({ data });
+  });
+} });
+"""
 
 OUTSIDE = """() => {
   const sought = 'button, input, select, h1, dd, canvas, .touch, #next, figcaption';
@@ -100,6 +108,11 @@ def page(console, browser):
 def follows(console, page, begin):
     """Whether the slave is moved by a hand."""
     return lambda: console.moved(begin) > FAR and page.evaluate(FOLLOWING)
+
+
+def leave(script):
+    """In one turn of the page: a stall of the machine may end a grip just before."""
+    return f'(() => {{ const held = {FOLLOWING}; if (held) {{ {script}; }} return held; }})()'
 
 
 def press_keys(page, *keys):
@@ -227,8 +240,9 @@ def test_a_gamepad_holds_and_lets_go_when_unplugged(console, browser):
             lambda on=on: page.evaluate(f'pad.buttons[5].pressed = {on} === 1; pad.axes[0] = {on}')
             for on in (1, 0)
         )
-        grip(page, press, release, follows(console, page, begin))
-        page.evaluate("plugged = false; dispatchEvent(new Event('gamepaddisconnected'))")
+        moved = follows(console, page, begin)
+        unplug = leave("plugged = false; dispatchEvent(new Event('gamepaddisconnected'))")
+        grip(page, press, release, lambda: moved() and page.evaluate(unplug))
         shows(page, 'lamp', 'OPEN')
         shows(page, 'lamp-why', 'the gamepad was unplugged')
         expect(page.locator('#alarms')).to_contain_text('The gamepad is gone.')
@@ -257,9 +271,7 @@ def test_what_takes_the_page_away_lets_go_at_once(console, page, script, reason)
     begin = console.now_ns
     press, release = press_keys(page, 'Space', 'ArrowLeft')
     moved = follows(console, page, begin)
-    # In one turn of the page: a stall of the machine may end a grip just before.
-    leave = f'(() => {{ const held = {FOLLOWING}; if (held) {{ {script}; }} return held; }})()'
-    grip(page, press, release, lambda: moved() and page.evaluate(leave))
+    grip(page, press, release, lambda: moved() and page.evaluate(leave(script)))
     # A page that was left has no connection any more.
     shows(page, 'lamp', 'OPEN' if reason else 'UNKNOWN')
     if reason is not None:
@@ -268,6 +280,19 @@ def test_what_takes_the_page_away_lets_go_at_once(console, page, script, reason)
     page.keyboard.down('Space')
     assert console.stands(page), 'a key that is held all along does not engage again'
     release()
+
+
+def test_what_the_server_said_before_it_heard_hides_no_reason(console, browser):
+    with console.page(browser, script=REPEATS) as page:
+        enable(page)
+        begin = console.now_ns
+        press, release = press_keys(page, 'Space', 'ArrowLeft')
+        moved = follows(console, page, begin)
+        freeze = leave("document.dispatchEvent(new Event('freeze')); saidAgain()")
+        grip(page, press, release, lambda: moved() and page.evaluate(freeze))
+        shows(page, 'lamp', 'OPEN')
+        shows(page, 'lamp-why', 'this page was frozen')
+        release()
 
 
 def test_a_reloaded_page_has_to_begin_anew(console, page):

@@ -4,7 +4,6 @@ Real nodes in real time, real drivers over a pseudo-terminal and TCP.  Each faul
 the slave took, which `ros_ws/doc/device_faults_sensors.md` tabulates; nothing is asserted of it.
 """
 
-import contextlib
 import time
 from itertools import pairwise
 
@@ -14,22 +13,24 @@ from aurora_rig import Instrument
 from load_cell_rig import BROKEN, SATURATED, Cells, transmitter, write_calibration
 from rclpy.context import Context
 from sensor_graph import PATIENCE_S, SensorGraph
+from std_msgs.msg import String
 
 from endoscope_bags import open_bag
-from endoscope_bags.errors import BagError
 from endoscope_emulators.aurora import AuroraEmulator
 from endoscope_emulators.cables.serial_cable import SerialCable
+from endoscope_nodes.names import OPERATING_STATE
 from endoscope_nodes.nodes.em_tracker import EmTrackerNode
 from endoscope_nodes.nodes.load_cells import LoadCellsNode
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.private_domain import private_domain
+from endoscope_nodes.runtime.qos import RESULT
 from endoscope_nodes.runtime.runtime import Runtime
 
 CELLS = 'load_cells: cells'
 TRACKER = 'em_tracker: tracker'
 LATENCY = 0.03
-# Causes of the faults so far and when they were found, in ns, for whoever reads the bag.
-FAULTS = []
+# Causes of the faults that were tried so far, for whoever reads the bag.
+TRIED = []
 STALLS = ('stood still for', 'was not run', 'motor/measured_js has been silent')
 """What is said where a busy machine ran a node too late, and ends the session."""
 TRIALS = 20
@@ -66,6 +67,11 @@ class Rig:
                 'registration_file': str(folder / 'straight.yaml'),
             },
         )
+        self.told = []  # states of operation, each with the cause of its time
+        self.graph.probe.create_subscription(String, OPERATING_STATE, self.note, RESULT)
+
+    def note(self, state):
+        self.told.append((self.graph.nodes['supervisor'].machine.cause, state.data))
 
     def close(self):
         try:
@@ -114,10 +120,13 @@ def moving(rig):
     graph.wait(under_way)
 
 
+def is_stall(cause):
+    return any(words in cause for words in STALLS)
+
+
 def stalled(rig):
     """Whether a stall of this machine, and nothing that was tried, has ended the session."""
-    cause = rig.graph.nodes['supervisor'].machine.cause
-    return rig.graph.state == 'FAULT' and any(words in cause for words in STALLS)
+    return rig.graph.state == 'FAULT' and is_stall(rig.graph.nodes['supervisor'].machine.cause)
 
 
 def goes_on(rig, trial):
@@ -149,13 +158,16 @@ def fault(rig, name, causes, begin, end):
         if not stalled(rig):
             break
         end()
-    cause = graph.nodes['supervisor'].machine.cause
-    assert any(words in cause for words in causes), cause
-    FAULTS.append((time.time_ns(), cause))
-    stopped = graph.wait(lambda: held(rig))
-    graph.says('supervisor: operating state', cause)
-    answer = graph.refused('enable')
-    assert any(words in answer for words in causes), answer
+    try:
+        cause = graph.nodes['supervisor'].machine.cause
+        assert any(words in cause for words in causes), cause
+        TRIED.append(cause)
+        stopped = graph.wait(lambda: held(rig))
+        graph.says('supervisor: operating state', cause)
+        answer = graph.refused('enable')
+        assert any(words in answer for words in causes), answer
+    finally:
+        end()
     figures(
         name,
         fault=1e3 * (found - begun),
@@ -163,7 +175,6 @@ def fault(rig, name, causes, begin, end):
         last_reading=1e3 * (max(at for at, _ in graph.tensions if at < found) - begun),
         before=1e3 * (begun - last_good),
     )
-    end()
     count = len(graph.tensions)
     graph.wait(lambda: len(graph.tensions) > count + 20)
     graph.serve(0.1)
@@ -379,11 +390,13 @@ def start(arguments, factory, overrides):
         runtime.add(factory)
 
 
+def changed(states):
+    return [b for a, b in pairwise(states) if a[1] != b[1]]
+
+
 def test_the_bag_shows_it_all(rig):
     """Comes last: it ends the recording."""
-    # Tried again, this finds the recording ended.
-    with contextlib.suppress(BagError):
-        rig.graph.nodes['recorder'].stop()
+    rig.graph.nodes['recorder'].stop()
     bag = open_bag(rig.folder / 'bag')
     wires = bag.joint_state('wires/measured_js')
     assert np.isfinite(wires.effort).all()
@@ -391,18 +404,17 @@ def test_the_bag_shows_it_all(rig):
     poses = bag.joint_state('slave/measured_js')
     assert (np.diff(poses.stamp_ns) > 0).all()
     states = [(raw.log_ns, m.data) for raw, m in bag.decoded('/endoscope/slave/operating_state')]
-    changes = [b for a, b in pairwise(states) if a[1] != b[1]]
-    # There may be others: a stall of this machine ends a session, too.
-    ended = [at for at, name in changes if name == 'FAULT']
-    faults = [min(ended, key=lambda at: abs(at - found)) for found, _ in FAULTS]
-    assert len(set(faults)) == len(FAULTS)
-    assert {name for _, name in changes} == {'ENABLED', 'FAULT'}
+    assert {name for _, name in changed(states)} == {'ENABLED', 'FAULT'}
+    found, causes = ([x for x, name in changed(of) if name == 'FAULT'] for of in (states, rig.told))
+    # A stall of this machine ends a session, too.
+    faults = [at for at, cause in zip(found, causes, strict=True) if not is_stall(cause)]
+    assert [cause for cause in causes if not is_stall(cause)] == TRIED
     gaps = np.flatnonzero(np.diff(wires.stamp_ns) > 45_000_000)
     silences = [(wires.stamp_ns[k], wires.stamp_ns[k + 1]) for k in gaps]
     within = [any(a < at < b for a, b in silences) for at in faults]
-    assert within == ['ceiling' not in cause for _, cause in FAULTS]
+    assert within == ['ceiling' not in cause for cause in TRIED]
     said = ' '.join(status.message for _, m in bag.decoded('/diagnostics') for status in m.status)
-    for _, words in FAULTS:
+    for words in TRIED:
         assert words in said
 
 

@@ -113,6 +113,7 @@ class View:
                 'state': said.state,
                 'reason': said.reason or '',
                 'missing': said.missing or '',
+                'grips': operations.beat.grips,
                 'following': engaged and pictures.wanted is not None and pictures.drives,
                 'counts': said.counts,
             },

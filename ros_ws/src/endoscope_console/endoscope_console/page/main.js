@@ -38,7 +38,7 @@ const now = () => performance.now() / 1000;
 const app = {
   hands: new Hands(), deadMan: null, orders: new Orders(command),
   state: null, picture: null, signals: [], modes: [], ceiling: 60, you: null, role: null,
-  mine: false, claiming: false, connected: false, everConnected: false, endedHere: '', pictures: 0, picturesLost: 0,
+  mine: false, claiming: false, connected: false, everConnected: false, endedHere: '', endedGrip: 0, pictures: 0, picturesLost: 0,
   touch: matchMedia('(pointer: coarse)').matches,
   whyClosed: '', whyLost: '', lostAt: -Infinity, claimedAt: 0, stateArrived: 0, tab: 'operate',
   sinceState: () => now() - app.stateArrived,
@@ -90,6 +90,7 @@ app.deadMan = new DeadMan(app.hands, { pad: $('pad'), thumb: $('thumb') }, {
   asked: (what) => operate.gamepadAsked(what),
   ended(reason) {
     app.endedHere = reason;
+    app.endedGrip = app.hands.grips;
     operate.say(`Let go: ${reason}.`);
     render();
   },
@@ -162,8 +163,10 @@ telemetry.addEventListener('message', ({ detail }) => {
   if (app.mine && settled && detail.lease?.holder !== app.you) {
     app.lost('The controls are lost.');
   }
-  // Once the server tells of a newer grip, what ended the last one here is an old story.
-  if (detail.dead_man?.state === 'ENGAGED') app.endedHere = '';
+  // Once the server tells of another grip, what ended the last one here is an old story. Of that one
+  // it may still tell: what it said before it heard of its end is under way.
+  const { state, grips } = detail.dead_man;
+  if (state === 'ENGAGED' && (detail.lease.holder !== app.you || grips > app.endedGrip)) app.endedHere = '';
   render();
 });
 for (const socket of [telemetry, command]) {

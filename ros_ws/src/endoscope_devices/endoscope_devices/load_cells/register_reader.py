@@ -6,6 +6,11 @@ from dataclasses import dataclass
 from endoscope_devices.load_cells.modbus_framing import Framing, ReplyError, ReplyTrouble
 from endoscope_devices.load_cells.modbus_line import LONGEST, Line
 
+# After each fence that failed, the next waits for a longer silence: the fewer are under way at a
+# time, the later an answer may come and still be told from the others.
+_LONGER = 8
+_LONGEST_SILENCE_NS = 1_000_000_000
+
 
 @dataclass(frozen=True)
 class RegisterReading:
@@ -21,7 +26,8 @@ class RegisterReader:
     Modbus RTU replies do not say which request they answer: a late one looks like the answer to the
     next. So after a silence, and after bytes that nobody asked for, a fence is put up: registers
     are asked for in another number, and until the answer to that has come, which a transmitter
-    gives in order, nothing counts.
+    gives in order, nothing counts. Fences ask for different numbers in turn: a late answer to one
+    of them must not open the next.
     """
 
     def __init__(self, line: Line, framing: Framing, reply_timeout: float) -> None:
@@ -29,6 +35,8 @@ class RegisterReader:
         self._framing = framing
         self._timeout_ns = round(reply_timeout * 1e9)
         self._fenced = False
+        self._fences = 0  # put up so far
+        self._silence_ns = self._timeout_ns // 4  # which the next fence waits for
         self.unexpected = 0  # bytes that came without a question
 
     def read(self, address: int, count: int) -> RegisterReading:
@@ -45,15 +53,19 @@ class RegisterReader:
 
     def _fence(self, address: int, count: int) -> None:
         self._fenced = True
-        while self._line.read(LONGEST, time.monotonic_ns() + self._timeout_ns // 4):
+        while self._line.read(LONGEST, time.monotonic_ns() + self._silence_ns):
             pass
+        self._silence_ns = min(_LONGER * self._silence_ns, _LONGEST_SILENCE_NS)
+        others = range(1, count) if count > 1 else range(2, 5)
+        self._fences += 1
         try:
-            self._ask(address, 1 if count > 1 else 2)
+            self._ask(address, others[self._fences % len(others)])
         except ReplyError as error:
             # A refusal answers the fence's own question as well: two registers may not exist.
             if error.trouble is not ReplyTrouble.REFUSED:
                 raise
         self._fenced = False
+        self._silence_ns = self._timeout_ns // 4
 
     def _ask(self, address: int, count: int) -> RegisterReading:
         asked = time.monotonic_ns()
