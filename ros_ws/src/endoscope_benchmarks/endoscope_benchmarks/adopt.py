@@ -114,8 +114,7 @@ def run(args: argparse.Namespace) -> int:
     for call, future in side_by_side(args.jobs, adopted, [c for c in calls if c not in rows]):
         rows[call] = future.result()
         print(rows[call].line(), flush=True)
-        if args.json:
-            keep_row(args.json, rows[call])
+        keep_row(args.json, rows[call])
         if time.monotonic() > ends:
             report(f'ended after {args.within:g} s with {len(rows)} of {len(calls)} rigs')
             break

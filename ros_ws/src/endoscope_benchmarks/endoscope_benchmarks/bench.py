@@ -61,8 +61,10 @@ def rows_so_far[R](file: Path | None, kind: type[R]) -> list[R]:
     return kept_rows(file, kind) if file is not None and file.exists() else []
 
 
-def keep_row(file: Path, row: Any) -> None:
-    """Add a row, which is a dataclass, at the end of a file of JSON lines."""
+def keep_row(file: Path | None, row: Any) -> None:
+    """Add a row, which is a dataclass, at the end of a file of JSON lines, if there is one."""
+    if file is None:
+        return
     with file.open('a', encoding='utf-8') as lines:
         lines.write(json.dumps(asdict(row)) + '\n')
 

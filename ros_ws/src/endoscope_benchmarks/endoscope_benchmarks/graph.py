@@ -5,7 +5,8 @@ import os
 import tempfile
 import time
 from collections import Counter, deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from std_msgs.msg import String
 from endoscope_benchmarks.bench import cpu_seconds, spread
 from endoscope_benchmarks.faults.node_processes import NODES, NodeProcesses
 from endoscope_benchmarks.faults.operator import Operator
+from endoscope_core.exit_status import ClosedOnExit
 from endoscope_core.safety import OperatingState
 from endoscope_nodes.graph import ALL_NODES
 from endoscope_nodes.names import CLOCK_NODE, STATE_COMMAND
@@ -54,16 +56,14 @@ def composed_graph_is_carried(seconds: float) -> bool:
     """Measure all nodes, recorder included, composed here in real time, once they have settled."""
     with tempfile.TemporaryDirectory() as folder:
         bag = str(Path(folder) / 'bag')
-        graph = Composition(ALL_NODES, {'recorder': {'bag': bag}, 'console': _PLAYING})
-        try:
+        overrides = {'recorder': {'bag': bag}, 'console': _PLAYING}
+        with Composition(ALL_NODES, overrides) as graph:
             graph.enable()
             graph.serve(_SETTLING_S)
             pace = graph.kept_pace(seconds)
             machine = graph.node('supervisor').machine
             state = f'{machine.state} {machine.cause}'.strip()
             report = graph.node('recorder').stop()
-        finally:
-            graph.close()
     print(
         f'one process, 1 kHz, {pace.elapsed:.0f} s: {pace}, {report.message_count} messages '
         f'recorded, {report.lost_count} lost, {state} at the end, load average '
@@ -83,16 +83,10 @@ def lock_step_speed(seconds: float) -> float:
     with tempfile.TemporaryDirectory() as folder:
         bag = str(Path(folder) / 'bag')
         overrides = {'recorder': {'bag': bag}, 'console': _PLAYING}
-        graph = Composition((*ALL_NODES, SimulationClockNode), overrides, SIMULATED)
-        try:
-            graph.advance(0.5)
-            graph.enable()
-            graph.advance(0.5)
+        with _in_lock_step(overrides, 0.5) as graph:
             began = time.monotonic()
             graph.advance(seconds)
             return seconds / (time.monotonic() - began)
-        finally:
-            graph.close()
 
 
 def least_cores(
@@ -102,20 +96,26 @@ def least_cores(
 
     In lock-step: the same ticks with the same messages, however busy the machine is.
     """
-    graph = Composition((*ALL_NODES, SimulationClockNode), overrides, SIMULATED)
-    try:
-        graph.advance(0.5)
-        graph.enable()
-        graph.advance(settling_s)
+    with _in_lock_step(overrides, settling_s) as graph:
         costs = []
         for _ in range(round(seconds)):
             cpu = time.process_time()
             graph.advance(1.0)
             costs.append(time.process_time() - cpu)
-        # What else a machine does only adds, by its caches.
-        return min(costs)
-    finally:
-        graph.close()
+    # What else a machine does only adds, by its caches.
+    return min(costs)
+
+
+@contextmanager
+def _in_lock_step(
+    overrides: Mapping[str, Mapping[str, object]], settling_s: float
+) -> Iterator['Composition']:
+    """All nodes in simulated time, enabled and settled."""
+    with Composition((*ALL_NODES, SimulationClockNode), overrides, SIMULATED) as graph:
+        graph.advance(0.5)
+        graph.enable()
+        graph.advance(settling_s)
+        yield graph
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ class Pace:
         )
 
 
-class Composition:
+class Composition(ClosedOnExit):
     """Nodes in this process with a context and a domain of their own."""
 
     _PATIENCE_S = 60.0

@@ -125,8 +125,7 @@ def asked(
             stopped=stopped,
             cpu_s=answer.cpu_s,
         )
-        if file:
-            keep_row(file, rows[by])
+        keep_row(file, rows[by])
 
     rig = SimulatedRig(case, read, min(until, time.time() + 60.0 * rig_minutes))
 
@@ -329,7 +328,6 @@ def _cells(rows: Sequence[Asked]) -> tuple[str, ...]:
 def _failed(stratum: str, seed: int, error: BaseException, file: Path | None) -> list[Asked]:
     row = vars(failed(stratum, seed, error))
     rows = [Asked(**row, by=by) for by in (COMMISSIONED, ASKED, FIXED)]
-    if file:
-        for each in rows:
-            keep_row(file, each)
+    for each in rows:
+        keep_row(file, each)
     return rows

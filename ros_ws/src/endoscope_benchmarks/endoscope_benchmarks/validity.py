@@ -132,8 +132,7 @@ def run(args: argparse.Namespace) -> int:
     for done, (call, future) in enumerate(side_by_side(args.jobs, aged, calls), 1):
         for row in future.result():
             rows[row.cause, row.seed, row.hour] = row
-            if args.json:
-                keep_row(args.json, row)
+            keep_row(args.json, row)
         report(f'{done} of {len(calls)}: {call[0]}, seed {call[1]}')
     wanted = [row for row in rows.values() if row.seed in args.seeds]
     print(today_and_machine())
@@ -228,7 +227,7 @@ def table(rows: Sequence[Row], causes: Sequence[str]) -> str:
     for cause in causes:
         first = {row.seed: row for row in rows if row.cause == cause and row.hour == 0.0}
         for hour in HOURS:
-            of = [row for row in rows if (row.cause, row.hour) == (cause, hour)]
+            of = _of(rows, cause, hour)
             if not of:
                 continue
             same = sum(row.class_deg == first[row.seed].class_deg for row in of)

@@ -89,10 +89,13 @@ def test_help_loads_nothing_heavy():
     assert shown.stdout.count('usage: endoscope ') == len(names) + 1
 
 
-def test_what_operates_a_graph_loads_nothing_that_computes():
+@pytest.mark.parametrize(
+    'module', ['endoscope_bringup.operating.actions', 'endoscope_nodes.healthcheck']
+)
+def test_what_only_asks_a_graph_loads_nothing_that_computes(module):
     code = (
-        'import sys\n'
-        'from endoscope_bringup.operating import actions, listening\n'
+        'import importlib, sys\n'
+        f'importlib.import_module({module!r})\n'
         "print(*sorted({'numba', 'scipy', 'sklearn'} & set(sys.modules)))\n"
     )
     done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)

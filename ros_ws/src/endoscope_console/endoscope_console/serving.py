@@ -41,7 +41,7 @@ from endoscope_core.errors import EndoscopeError
 from endoscope_core.rig import Rig, load_rig
 from endoscope_nodes.client.graph_client import WHOLE_S
 from endoscope_nodes.client.graph_listener import RECORDER, SUPERVISOR, Health
-from endoscope_nodes.names import JOINTS
+from endoscope_nodes.names import BAG, JOINTS
 from endoscope_nodes.program import NODES, REAL_TIME
 from endoscope_nodes.runtime.runtime import GC_THRESHOLDS, SWITCH_INTERVAL_S
 
@@ -84,7 +84,7 @@ class _Graph:
 
     def recording(self, said: Health) -> str:
         """Say whether and where it records, and how it would not."""
-        bag = said.values.get('bag')
+        bag = said.values.get(BAG)
         if bag is None:
             return said.message
         if self._process is None:

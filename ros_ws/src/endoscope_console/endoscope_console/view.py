@@ -23,7 +23,7 @@ from endoscope_nodes.client.graph_listener import (
     Health,
 )
 from endoscope_nodes.client.plant_adoption import PlantInForce
-from endoscope_nodes.names import WIRES
+from endoscope_nodes.names import BAG, WIRES
 
 _LEVELS = ('ok', 'warning', 'error', 'stale')
 _TENSE = 0.9
@@ -275,7 +275,7 @@ def _adopted(told: PlantInForce | None) -> dict[str, Any] | None:
 
 
 def _recorder(said: Health | None) -> dict[str, Any]:
-    bag = '' if said is None else said.values.get('bag', '')
+    bag = '' if said is None else said.values.get(BAG, '')
     return {
         'recording': bool(bag),
         'bag': bag,

@@ -50,8 +50,7 @@ def run(args: argparse.Namespace) -> int:
         error = future.exception()
         rows[case] = failed(*case, error) if error else future.result()
         print(rows[case].line(), flush=True)
-        if args.json:
-            keep_row(args.json, rows[case])
+        keep_row(args.json, rows[case])
     known = list(STRATA)
     print('\n' + table([rows[case] for case in sorted(cases, key=lambda c: known.index(c[0]))]))
     differ = [(c, each) for c in before for each in differences(before[c], rows[c])]

@@ -55,10 +55,8 @@ def _in_lock_step(watched: bool, seconds: float) -> float:
 
 def _in_real_time(watched: bool, seconds: float) -> Pace:
     with tempfile.TemporaryDirectory() as folder:
-        graph = Composition(ALL_NODES, _overrides(folder, watched, _LEARNT_S + seconds))
-        try:
+        overrides = _overrides(folder, watched, _LEARNT_S + seconds)
+        with Composition(ALL_NODES, overrides) as graph:
             graph.enable()
             graph.serve(_LEARNT_S)
             return graph.kept_pace(seconds)
-        finally:
-            graph.close()

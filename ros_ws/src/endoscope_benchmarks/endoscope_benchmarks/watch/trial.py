@@ -38,8 +38,7 @@ def run(args: argparse.Namespace) -> int:
     ends = time.monotonic() + args.within
     for (kind, seed, _), future in side_by_side(args.jobs, watched, calls):
         rows[kind, seed] = future.result()
-        if args.json:
-            keep_row(args.json, rows[kind, seed])
+        keep_row(args.json, rows[kind, seed])
         if time.monotonic() > ends:
             report(f'ended after {args.within:g} s with {len(rows)} of {len(cases)} rigs')
             break

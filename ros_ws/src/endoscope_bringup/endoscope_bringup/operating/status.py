@@ -7,7 +7,7 @@ from typing import Any
 
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import LOCK_STEP, MASTER, RECORDER, Health
-from endoscope_nodes.names import CLOCK_NODE, FACTOR, JOINTS
+from endoscope_nodes.names import BAG, CLOCK_NODE, FACTOR, JOINTS
 from endoscope_nodes.program import NODES
 
 _LEVELS = ('ok', 'WARN', 'ERROR', 'STALE')
@@ -24,7 +24,7 @@ def status_of(client: GraphClient, patience_s: float) -> tuple[tuple[str, ...], 
     health, silent = client.health, _silent(client)
     master, recorder = health.get(MASTER), health.get(RECORDER)
     source = '' if master is None else master.values.get('source', '')
-    bag = '' if recorder is None else recorder.values.get('bag', '')
+    bag = '' if recorder is None else recorder.values.get(BAG, '')
     values = {
         'state': client.state,
         'why': client.why,
@@ -90,10 +90,10 @@ def _master(source: str, said: Health | None) -> str:
 def _recorder(said: Health | None) -> str:
     if said is None:
         return 'silent'
-    if not said.values.get('bag'):
+    if not said.values.get(BAG):
         return said.message
     counts = f'{said.values["messages"]} messages, {said.values["lost"]} lost'
-    return f'{said.message} to {said.values["bag"]}, {counts}'
+    return f'{said.message} to {said.values[BAG]}, {counts}'
 
 
 def _nodes(health: dict[str, Health]) -> list[str]:

@@ -32,8 +32,7 @@ from endoscope_core.physics.packing import without_functions
 from endoscope_core.physics.plant_file import plant_from_mapping
 from endoscope_core.physics.simulator import TICK, simulate
 from endoscope_core.rig import Rig, digest
-from endoscope_core.safety.adoption_code import AdoptionCode
-from endoscope_core.safety.bending_range import BendingRange
+from endoscope_core.safety import AdoptionCode, BendingRange
 from endoscope_core.schema import parse_yaml
 from endoscope_core.signals import periodic_signal
 

@@ -40,7 +40,7 @@ from endoscope_core.physics.layout import (
 from endoscope_core.physics.packing import pack, rest_state
 from endoscope_core.physics.sheath import MOTOR_END
 from endoscope_core.physics.simulator import simulate
-from endoscope_core.safety.bending_range import BendingRange
+from endoscope_core.safety import BendingRange
 
 PROFILE = 'friction_profile'
 Array = NDArray[np.float64]

@@ -226,16 +226,17 @@ def tracking(log: Log) -> str:
     answer = log.last_answer
     names = {name.id for name in answer.names} if answer else set()
     read = sorted(names & KNOWN.keys() & {effect.id for effect, _ in LINKS[TRACKER.name]})
-    return (
+    said = (
         'On a motion that is among no experiments the tip is off by '
         f'{described:.2g} deg (rms) where the described plant is inverted, '
         f'and by {improved:.2g} deg where the improved one is.'
-    ) + (
-        f' Both are as the tracker reads the tip, so that {" and ".join(read)} counts as an error '
-        'of it.'
-        if read
-        else ''
     )
+    if read:
+        said += (
+            f' Both are as the tracker reads the tip, so that {" and ".join(read)} counts as an '
+            'error of it.'
+        )
+    return said
 
 
 def times(log: Log) -> list[str]:
