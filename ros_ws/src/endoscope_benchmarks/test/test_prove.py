@@ -54,7 +54,7 @@ def test_without_a_law_the_other_simulator_reads_what_the_kernel_does(rig):
     sensors = plant.sensors
     assert shaft < 1e-9
     assert effort < 0.1 * sensors.effort_noise
-    assert max(tensions) < sensors.load_cell_noise
+    assert max(tensions) < 0.3 * sensors.load_cell_noise
     assert angle < 0.1 * sensors.tracker_noise
 
 

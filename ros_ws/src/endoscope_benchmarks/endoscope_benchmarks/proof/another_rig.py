@@ -27,8 +27,13 @@ TICK = 1e-3
 """Of commands and servo, s."""
 EVERY = 5
 """Of these, ticks of the wires: they have no inertia, and in 5 ms hardly any way to turn back."""
-NODES, FEW_NODES = 30, 12
-"""Of a wire; with the few a law's strength is found."""
+NODES, FEW_NODES = 100, 12
+"""Of a wire; with the few a law's strength is found.
+
+Just after a turn the spring at a wire's end follows a chord of the true curve. Beside a continuous
+sheath the tensions of a commissioning motion are off by 0.020 N (rms) with 30 nodes, as much as a
+cell's noise, by 0.0038 N with 100, and by 0.0035 N, which is that of the ticks, with 300.
+"""
 
 
 @dataclass(frozen=True)
