@@ -5,8 +5,9 @@ capstan's exponent (Euler 1769, Eytelwein 1808), so the tensions on its two side
 
     |ln T_i - ln T_(i+1)| <= dphi_i,
 
-and where they do not, it slips just far enough that they do. One node after the other is put right
-and all again until none moves, beginning with a guess of which ones slip. Nothing here knows of fronts that run into the wire: they come out.
+and where they do not, it slips just far enough that they do. Beginning with a guess of which ones
+slip, one node after the other is put right, and all again until none moves. Nothing here knows of
+fronts that run into the wire: they come out.
 
 A wire of `cells` nodes has its tensions at s = i / cells, i = 0 .. cells; the springs at its two
 ends are half as long as the others, so the sums over the wire are trapezoidal rules and its two end
