@@ -30,7 +30,7 @@ from endoscope_benchmarks.papers.tracking_trial import (
     run_tracking_trial,
     within_reach,
 )
-from endoscope_benchmarks.watch.changing_rig import MovingRig, show
+from endoscope_benchmarks.watch.changing_rig import MovingRig, motion_of, show
 from endoscope_core.atomic_output import write_text
 from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_core.control import FeedforwardLaw
@@ -207,10 +207,7 @@ def is_told(tube: NeverSeenTube, slow: Slow, first: CalibrationFindings, seed: i
     sensors = SensorModel(tube.plant.sensors, seed)
     stiffness = np.array([joint.wire_stiffness for joint in tube.plant.joints.values()])
     generator = np.random.default_rng(seed)
-    parts: list[Array] = []
-    while sum(map(len, parts)) * TICK < _BEFORE_S + _AFTER_S:
-        parts.append(motions.teleoperation(generator, len(names)))
-    moving = np.concatenate(parts)
+    moving = motion_of(generator, _BEFORE_S + _AFTER_S, [motions.teleoperation])
     for begin in range(0, round((_BEFORE_S + _AFTER_S) / TICK), _BLOCK):
         if begin == round(_BEFORE_S / TICK):
             travel = slice(layout.TRAVEL, layout.TRAVEL + 2)

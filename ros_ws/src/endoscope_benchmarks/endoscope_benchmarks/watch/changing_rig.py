@@ -1,7 +1,7 @@
 """Rigs that become different while they move, and what a watch says of them."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,6 +37,15 @@ SIZES = (0.7, 1.5)
 TOLD_WITHIN_S = 10.0
 SEGMENT_S = 600.0
 """Nominal motion after which rig, tube, sheath and hand are drawn anew."""
+Moved = Callable[[np.random.Generator, int], Array]
+"""Draws setpoints (N, J) in rad for J joints."""
+# A hand half of the time, otherwise motions made to identify.
+_MOTIONS: tuple[Moved, ...] = (
+    motions.commissioning,
+    motions.another,
+    motions.teleoperation,
+    motions.teleoperation,
+)
 _BLOCK = round(BLOCK_S / TICK)
 _TRACKER_TICKS = 25
 _CHANGE_S, _AFTER_S = (50.0, 80.0), 16.0
@@ -101,7 +110,7 @@ def _watched(kind: str, seed: int, thresholds: Mapping[str, float]) -> Watched:
     if generator.random() < 0.5:
         true = rigs.other_sheath(generator, true)
     at = BLOCK_S * round(generator.uniform(*_CHANGE_S) / BLOCK_S)
-    moving = _motion(generator, at + _AFTER_S if kind else SEGMENT_S)
+    moving = motion_of(generator, at + _AFTER_S if kind else SEGMENT_S, _MOTIONS)
     rig = _ChangingRig(generator, true, kind, at)
     watch, sensors = RigWatch(described, thresholds), SensorModel(true.sensors, seed)
     largest = dict.fromkeys(map(str, Part), 0.0)
@@ -120,6 +129,14 @@ def _watched(kind: str, seed: int, thresholds: Mapping[str, float]) -> Watched:
         tuple(f'{alarm.at - at:+.1f} s {alarm}' for alarm in alarms),
         largest,
     )
+
+
+def motion_of(generator: np.random.Generator, seconds: float, kinds: Sequence[Moved]) -> Array:
+    """Setpoints (N, 2) in rad of motions drawn from some kinds."""
+    parts: list[Array] = []
+    while sum(map(len, parts)) * TICK < seconds:
+        parts.append(kinds[int(generator.integers(len(kinds)))](generator, 2))
+    return np.concatenate(parts)[: round(seconds / TICK)]
 
 
 def show(
@@ -204,12 +221,3 @@ class _ChangingRig(MovingRig):
             first = describe('contact').first_parameter
             row[first] = self._depth * self._bent[int(self._sign > 0.0)]
             row[first + 1] = self._size * _STIFFNESS
-
-
-def _motion(generator: np.random.Generator, seconds: float) -> Array:
-    """Setpoints (N, 2) in rad: a hand half of the time, otherwise motions made to identify."""
-    kinds = (motions.commissioning, motions.another, motions.teleoperation, motions.teleoperation)
-    parts: list[Array] = []
-    while sum(map(len, parts)) * TICK < seconds:
-        parts.append(kinds[int(generator.integers(len(kinds)))](generator, 2))
-    return np.concatenate(parts)[: round(seconds / TICK)]
