@@ -1,6 +1,9 @@
 """Load cells over a real serial line and a real network connection, with what goes wrong there."""
 
 import itertools
+import threading
+import time
+from pathlib import Path
 
 import minimalmodbus
 import pytest
@@ -148,6 +151,32 @@ def test_a_late_reply_is_never_the_answer_to_a_later_question(cable, cells, dela
         line.close()
     assert answered >= least
     assert silent > 5
+
+
+def test_a_line_that_is_never_silent_is_given_up(tmp_path):
+    over = threading.Event()
+
+    def chat(device):
+        with Path(device).open('wb', buffering=0) as port:
+            while not over.wait(0.005):
+                port.write(b'?')
+
+    with SerialCable(tmp_path / 'ttyCells') as cable:
+        line = SerialLine(str(cable.host), SerialSettings())
+        reader = RegisterReader(line, RtuFraming(1, 4), 0.05)
+        line.open()
+        thread = threading.Thread(target=chat, args=[cable.device])
+        thread.start()
+        try:
+            while not line.read(1, 0):
+                time.sleep(0.005)
+            for _ in range(2):
+                with pytest.raises(ReplyError):
+                    reader.read(0, 8)
+        finally:
+            over.set()
+            thread.join()
+            line.close()
 
 
 def test_doubled_replies_are_noticed(cable, on_serial):

@@ -53,8 +53,11 @@ class RegisterReader:
 
     def _fence(self, address: int, count: int) -> None:
         self._fenced = True
-        while self._line.read(LONGEST, time.monotonic_ns() + self._silence_ns):
-            pass
+        # A line that is never silent is asked all the same, and answers with nothing acceptable.
+        latest = time.monotonic_ns() + _LONGEST_SILENCE_NS
+        while (now := time.monotonic_ns()) < latest:
+            if not self._line.read(LONGEST, now + self._silence_ns):
+                break
         self._silence_ns = min(_LONGER * self._silence_ns, _LONGEST_SILENCE_NS)
         others = range(1, count) if count > 1 else range(2, 5)
         self._fences += 1
