@@ -124,7 +124,8 @@ class ModbusLoadCells(ReadingThread[WireReading]):
         if faults and self._unbelieved >= _FAULTY_READINGS:
             return '; '.join(faults)
         if self._silent():
-            return self._link_trouble or 'no believable reading yet'
+            when = 'yet' if self._age_ns() is None else 'lately'
+            return self._link_trouble or f'no believable reading {when}'
         return ''
 
     def health(self) -> tuple[str, dict[str, object]]:
