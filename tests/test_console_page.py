@@ -110,9 +110,12 @@ def follows(console, page, begin):
     return lambda: console.moved(begin) > FAR and page.evaluate(FOLLOWING)
 
 
-def leave(script):
-    """In one turn of the page: a stall of the machine may end a grip just before."""
-    return f'(() => {{ const held = {FOLLOWING}; if (held) {{ {script}; }} return held; }})()'
+def leaves(console, page, begin, script):
+    """Whether it has followed, and a script was run in that very turn of the page."""
+    # A stall of the machine may end a grip between two.
+    moved = follows(console, page, begin)
+    leave = f'(() => {{ const held = {FOLLOWING}; if (held) {{ {script}; }} return held; }})()'
+    return lambda: moved() and page.evaluate(leave)
 
 
 def press_keys(page, *keys):
@@ -240,9 +243,8 @@ def test_a_gamepad_holds_and_lets_go_when_unplugged(console, browser):
             lambda on=on: page.evaluate(f'pad.buttons[5].pressed = {on} === 1; pad.axes[0] = {on}')
             for on in (1, 0)
         )
-        moved = follows(console, page, begin)
-        unplug = leave("plugged = false; dispatchEvent(new Event('gamepaddisconnected'))")
-        grip(page, press, release, lambda: moved() and page.evaluate(unplug))
+        unplug = "plugged = false; dispatchEvent(new Event('gamepaddisconnected'))"
+        grip(page, press, release, leaves(console, page, begin, unplug))
         shows(page, 'lamp', 'OPEN')
         shows(page, 'lamp-why', 'the gamepad was unplugged')
         expect(page.locator('#alarms')).to_contain_text('The gamepad is gone.')
@@ -270,8 +272,7 @@ def test_what_takes_the_page_away_lets_go_at_once(console, page, script, reason)
     enable(page)
     begin = console.now_ns
     press, release = press_keys(page, 'Space', 'ArrowLeft')
-    moved = follows(console, page, begin)
-    grip(page, press, release, lambda: moved() and page.evaluate(leave(script)))
+    grip(page, press, release, leaves(console, page, begin, script))
     # A page that was left has no connection any more.
     shows(page, 'lamp', 'OPEN' if reason else 'UNKNOWN')
     if reason is not None:
@@ -287,9 +288,8 @@ def test_what_the_server_said_before_it_heard_hides_no_reason(console, browser):
         enable(page)
         begin = console.now_ns
         press, release = press_keys(page, 'Space', 'ArrowLeft')
-        moved = follows(console, page, begin)
-        freeze = leave("document.dispatchEvent(new Event('freeze')); saidAgain()")
-        grip(page, press, release, lambda: moved() and page.evaluate(freeze))
+        freeze = "document.dispatchEvent(new Event('freeze')); saidAgain()"
+        grip(page, press, release, leaves(console, page, begin, freeze))
         shows(page, 'lamp', 'OPEN')
         shows(page, 'lamp-why', 'this page was frozen')
         release()

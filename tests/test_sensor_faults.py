@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from aurora_rig import Instrument
 from load_cell_rig import BROKEN, SATURATED, Cells, transmitter, write_calibration
-from rclpy.context import Context
 from sensor_graph import PATIENCE_S, SensorGraph
 from std_msgs.msg import String
 
@@ -19,12 +18,7 @@ from endoscope_bags import open_bag
 from endoscope_emulators.aurora import AuroraEmulator
 from endoscope_emulators.cables.serial_cable import SerialCable
 from endoscope_nodes.names import OPERATING_STATE
-from endoscope_nodes.nodes.em_tracker import EmTrackerNode
-from endoscope_nodes.nodes.load_cells import LoadCellsNode
-from endoscope_nodes.runtime.parameters import ParameterError
-from endoscope_nodes.runtime.private_domain import private_domain
 from endoscope_nodes.runtime.qos import RESULT
-from endoscope_nodes.runtime.runtime import Runtime
 
 CELLS = 'load_cells: cells'
 TRACKER = 'em_tracker: tracker'
@@ -344,56 +338,6 @@ def test_moving_wires_are_not_tared_and_a_bent_tip_is_not_registered(rig):
     assert 'the wires move' in tared.message
     assert not registered.success
     assert 'kept turning' in registered.message or 'turned by' in registered.message
-
-
-@pytest.mark.parametrize(
-    ('overrides', 'words'),
-    [
-        ({'device': 'modbus_rtu'}, "'port' is empty"),
-        ({'device': 'modbus_rtu', 'port': '/dev/null'}, "'calibration_file' is empty"),
-        (
-            {'device': 'modbus_tcp', 'port': 'h:x', 'calibration_file': 'CELLS'},
-            "'h:x' is not an address",
-        ),
-        ({'device': 'modbus_rtu', 'port': 'p', 'calibration_file': 'nowhere'}, 'nowhere'),
-        ({'device': 'modbus'}, 'did you mean modbus_'),
-    ],
-)
-def test_parameters_of_real_cells_are_checked(tmp_path, overrides, words):
-    if overrides.get('calibration_file') == 'CELLS':
-        overrides = overrides | {'calibration_file': str(write_calibration(tmp_path))}
-    with pytest.raises(ParameterError, match=words):
-        start(['--ros-args', '--log-level', 'fatal'], LoadCellsNode, overrides)
-
-
-@pytest.mark.parametrize(
-    ('overrides', 'words'),
-    [
-        ({'device': 'aurora'}, "'port' is empty"),
-        ({'device': 'aurora', 'port': 'p', 'registration_file': 'BAD'}, 'orientation is missing'),
-        ({'device': 'polaris'}, 'aurora'),
-    ],
-)
-def test_parameters_of_a_real_tracker_are_checked(tmp_path, overrides, words):
-    if 'registration_file' in overrides:
-        (tmp_path / 'bad.yaml').write_text('position: [0, 0, 0]')
-        overrides = overrides | {'registration_file': str(tmp_path / 'bad.yaml')}
-    with pytest.raises(ParameterError, match=words):
-        start(['--ros-args', '--log-level', 'fatal'], EmTrackerNode, overrides)
-
-
-@pytest.mark.parametrize(
-    ('factory', 'device'), [(LoadCellsNode, 'modbus_tcp'), (EmTrackerNode, 'aurora')]
-)
-def test_real_devices_need_real_time(factory, device):
-    with pytest.raises(ParameterError, match='needs real time'):
-        start(['--ros-args', '-p', 'use_sim_time:=true'], factory, {'device': device})
-
-
-def start(arguments, factory, overrides):
-    name = 'load_cells' if factory is LoadCellsNode else 'em_tracker'
-    with Runtime(arguments, Context(), private_domain(), {name: overrides}) as runtime:
-        runtime.add(factory)
 
 
 def changed(states):

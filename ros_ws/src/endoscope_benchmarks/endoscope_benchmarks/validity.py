@@ -208,7 +208,7 @@ def is_told(tube: NeverSeenTube, slow: Slow, first: CalibrationFindings, seed: i
     stiffness = np.array([joint.wire_stiffness for joint in tube.plant.joints.values()])
     generator = np.random.default_rng(seed)
     moving = motion_of(generator, _BEFORE_S + _AFTER_S, [motions.teleoperation])
-    for begin in range(0, round((_BEFORE_S + _AFTER_S) / TICK), _BLOCK):
+    for begin in range(0, len(moving), _BLOCK):
         if begin == round(_BEFORE_S / TICK):
             travel = slice(layout.TRAVEL, layout.TRAVEL + 2)
             rig.state[0][:, travel] += (slow.lost / stiffness)[:, None]

@@ -90,7 +90,12 @@ def test_help_loads_nothing_heavy():
 
 
 @pytest.mark.parametrize(
-    'module', ['endoscope_bringup.operating.actions', 'endoscope_nodes.healthcheck']
+    'module',
+    [
+        'endoscope_bringup.operating.actions',
+        'endoscope_bringup.operating.listening',
+        'endoscope_nodes.healthcheck',
+    ],
 )
 def test_what_only_asks_a_graph_loads_nothing_that_computes(module):
     code = (
