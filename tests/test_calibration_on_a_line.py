@@ -9,63 +9,46 @@ from load_cell_rig import LATENCY, CellsOnWires, transmitter, write_calibration
 from sensor_graph import NODES, SensorGraph
 from tubes import tube_of_size
 
-from endoscope_emulators.cables.serial_cable import SerialCable
 from endoscope_nodes.names import CALIBRATION_RESULT
 from endoscope_nodes.nodes.calibration import CalibrationNode
 from endoscope_nodes.runtime.qos import RESULT
 
-# What a calibration says where this machine lets the graph or the line wait for too long.
+CELL_RATE, TICK_RATE = 500, 250
+SIZE_DEG = 80
 LONGEST_S = 600.0
+# What a calibration says where this machine lets the graph or the line wait for too long.
 STALLED = ('can be bridged', 'silent', 'the motion session has ended')
 
 
-@pytest.fixture
-def rtu(tmp_path):
+def test_a_calibration_ends_with_the_class_of_the_tube(tmp_path):
     cells = CellsOnWires()
-    with (
-        SerialCable(tmp_path / 'ttyCells') as cable,
-        transmitter(cells, serial_port=cable.device),
-    ):
-        yield 'modbus_rtu', str(cable.host), cells
-
-
-@pytest.fixture
-def tcp():
-    cells = CellsOnWires()
-    with transmitter(cells) as server:
-        yield 'modbus_tcp', f'127.0.0.1:{server.tcp_port}', cells
-
-
-@pytest.mark.parametrize(
-    ('line', 'cell_rate', 'tick_rate', 'size_deg'),
-    [('rtu', 200, 200, 50), ('tcp', 500, 250, 80)],
-)
-def test_a_calibration_ends_with_the_class_of_the_tube(
-    tmp_path, request, line, cell_rate, tick_rate, size_deg
-):
-    device, port, cells = request.getfixturevalue(line)
-    file = write_calibration(tmp_path, f'rate: {cell_rate}, latency: {LATENCY}')
-    overrides = tube_of_size(tmp_path, size_deg, 900 + size_deg)
-    overrides['load_cells'] = {'device': device, 'port': port, 'calibration_file': str(file)}
+    file = write_calibration(tmp_path, f'rate: {CELL_RATE}, latency: {LATENCY}')
+    overrides = tube_of_size(tmp_path, SIZE_DEG, 900 + SIZE_DEG)
     overrides['calibration'] = {'motion': 'brief'}
-    graph = SensorGraph(
-        tmp_path / 'bag',
-        cells=cells,
-        nodes=(*NODES, CalibrationNode),
-        tick_rate=tick_rate,
-        **overrides,
-    )
-    with graph:
-        results = []
-        graph.probe.create_subscription(DiagnosticArray, CALIBRATION_RESULT, results.append, RESULT)
-        graph.connect()
-        values = calibrated(graph, results)
-        assert values['class_deg'] == str(size_deg)
-        assert math.degrees(float(values['regressed_size'])) == pytest.approx(size_deg, abs=5.0)
+    with transmitter(cells) as server:
+        overrides['load_cells'] = {
+            'device': 'modbus_tcp',
+            'port': f'127.0.0.1:{server.tcp_port}',
+            'calibration_file': str(file),
+        }
+        graph = SensorGraph(
+            tmp_path / 'bag',
+            cells=cells,
+            nodes=(*NODES, CalibrationNode),
+            tick_rate=TICK_RATE,
+            **overrides,
+        )
+        with graph:
+            values = calibrated(graph)
+    assert values['class_deg'] == str(SIZE_DEG)
+    assert math.degrees(float(values['regressed_size'])) == pytest.approx(SIZE_DEG, abs=5.0)
 
 
-def calibrated(graph, results):
+def calibrated(graph):
     """Values of a result; where this machine stalls, the rig is enabled and asked again."""
+    results = []
+    graph.probe.create_subscription(DiagnosticArray, CALIBRATION_RESULT, results.append, RESULT)
+    graph.connect()
     deadline = time.monotonic() + LONGEST_S
     while time.monotonic() < deadline:
         graph.enable()
