@@ -108,21 +108,29 @@ class Moved:
     """What goals and shafts have done since."""
 
     def __init__(self, graph):
+        self._clock = graph.clock
         self.goals = graph.listen(MOTOR_COMMAND, MOTORS)
         self.shafts = graph.listen('motor/measured_js', MOTORS)
         self._bending = graph.listen('simulation/bending')
+        self.clear()
 
     def clear(self):
+        # What was measured before may come later still.
+        self._since_ns = self._clock.now_ns
         for samples in (self.goals, self.shafts, self._bending):
             samples.clear()
 
     @property
     def of_shafts(self):
-        return float(np.ptp([s.position for s in self.shafts], axis=0).max())
+        return self._way(self.shafts)
 
     @property
     def of_tip(self):
-        return float(np.ptp([s.position for s in self._bending], axis=0).max())
+        return self._way(self._bending)
+
+    def _way(self, samples):
+        since = [s.position for s in samples if s.stamp_ns >= self._since_ns]
+        return float(np.ptp(since, axis=0).max())
 
     @property
     def largest_step(self):
