@@ -236,6 +236,27 @@ def test_a_fault_of_the_graph_tells_its_cause(of_the_graph, capsys):
     assert (entry['kind'], entry['events'][0]['reason']) == ('fault', cause)
 
 
+def test_a_fault_that_is_left_at_once_tells_its_cause_too(tmp_path):
+    overrides = {
+        'recorder': {'bag': str(tmp_path / 'bag'), 'autostart': False},
+        'conductor': {'wait_for': [MOTOR_MEASURED]},
+    }
+    with SimulatedGraph(extra=(RecorderNode,), overrides=overrides) as graph:
+        graph.enable()
+        # Between what the supervisor says of itself once a second.
+        graph.advance(1.3)
+        graph.set('load_cells', connected=False)
+        while graph.state != 'FAULT':
+            graph.advance(0.02)
+        graph.set('load_cells', connected=True)
+        graph.advance(0.1)
+        graph.enable()
+        graph.advance(3.0)
+    [path] = event_bags(tmp_path)
+    [event] = events_of(open_bag(path).metadata)
+    assert event.reason.startswith('wires/measured_js'), event
+
+
 @pytest.mark.parametrize(
     'topic',
     [

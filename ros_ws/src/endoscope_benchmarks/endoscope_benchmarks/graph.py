@@ -19,6 +19,7 @@ from std_msgs.msg import String
 from endoscope_benchmarks.bench import cpu_seconds, spread
 from endoscope_benchmarks.faults.node_processes import NODES, NodeProcesses
 from endoscope_benchmarks.faults.operator import Operator
+from endoscope_core.errors import EndoscopeError
 from endoscope_core.exit_status import ClosedOnExit
 from endoscope_core.safety import OperatingState
 from endoscope_nodes.graph import ALL_NODES
@@ -54,16 +55,13 @@ _PLAYING = {'source': 'motion', 'motion': 'periodic'}
 
 def composed_graph_is_carried(seconds: float) -> bool:
     """Measure all nodes, recorder included, composed here in real time, once they have settled."""
-    with tempfile.TemporaryDirectory() as folder:
-        bag = str(Path(folder) / 'bag')
-        overrides = {'recorder': {'bag': bag}, 'console': _PLAYING}
-        with Composition(ALL_NODES, overrides) as graph:
-            graph.enable()
-            graph.serve(_SETTLING_S)
-            pace = graph.kept_pace(seconds)
-            machine = graph.node('supervisor').machine
-            state = f'{machine.state} {machine.cause}'.strip()
-            report = graph.node('recorder').stop()
+    with _recorded() as overrides, Composition(ALL_NODES, overrides) as graph:
+        graph.enable()
+        graph.serve(_SETTLING_S)
+        pace = graph.kept_pace(seconds)
+        machine = graph.node('supervisor').machine
+        state = f'{machine.state} {machine.cause}'.strip()
+        report = graph.node('recorder').stop()
     print(
         f'one process, 1 kHz, {pace.elapsed:.0f} s: {pace}, {report.message_count} messages '
         f'recorded, {report.lost_count} lost, {state} at the end, load average '
@@ -80,13 +78,10 @@ def composed_graph_is_carried(seconds: float) -> bool:
 
 def lock_step_speed(seconds: float) -> float:
     """Simulated seconds per real second of the whole graph in lock-step, recorder included."""
-    with tempfile.TemporaryDirectory() as folder:
-        bag = str(Path(folder) / 'bag')
-        overrides = {'recorder': {'bag': bag}, 'console': _PLAYING}
-        with _in_lock_step(overrides, 0.5) as graph:
-            began = time.monotonic()
-            graph.advance(seconds)
-            return seconds / (time.monotonic() - began)
+    with _recorded() as overrides, _in_lock_step(overrides, 0.5) as graph:
+        began = time.monotonic()
+        graph.advance(seconds)
+        return seconds / (time.monotonic() - began)
 
 
 def least_cores(
@@ -104,6 +99,13 @@ def least_cores(
             costs.append(time.process_time() - cpu)
     # What else a machine does only adds, by its caches.
     return min(costs)
+
+
+@contextmanager
+def _recorded() -> Iterator[Mapping[str, Mapping[str, object]]]:
+    """Parameters of a graph that moves and is recorded to a folder that is thrown away."""
+    with tempfile.TemporaryDirectory() as folder:
+        yield {'recorder': {'bag': f'{folder}/bag'}, 'console': _PLAYING}
 
 
 @contextmanager
@@ -190,6 +192,12 @@ class Composition(ClosedOnExit):
         self.serve(seconds)
         elapsed, cpu = time.monotonic() - began, time.process_time() - cpu
         ticks, missed = ticker.ticks - ticks, ticker.missed - missed
+        if not latency:
+            machine = self.node('supervisor').machine
+            raise EndoscopeError(
+                f'no command reached the motors: {machine.state} {machine.cause}'.rstrip()
+                + '; give the graph an idle machine'
+            )
         middle, late, _ = (1e-6 * each for each in spread(latency))
         return Pace(elapsed, ticks / (ticks + missed), middle, late, cpu / elapsed)
 

@@ -13,9 +13,8 @@ from endoscope_console.access import REPORTS
 from endoscope_console.background import Background
 from endoscope_console.explanations import PLANT_FILE, REPORT_FILE, Explanations
 from endoscope_core.errors import EndoscopeError, NotPlayedError, RigStoppedError
-from endoscope_core.investigation_folder import LOG
+from endoscope_core.investigation_folder import LOG, PAGE
 
-_PAGE = 'index.html'
 _ENDED = ('one_class_left', 'nothing_to_gain')
 """After these there is nothing to continue."""
 _TOLD = 5
@@ -90,7 +89,7 @@ class Investigation:
             self.error = self.error or f'{self.folder / LOG} is not the log of one: {error}'
             return
         self.goes_on = stopped not in _ENDED
-        if (self.folder / _PAGE).is_file():
+        if (self.folder / PAGE).is_file():
             self.report = f'{REPORTS}{self.secret}/{REPORT_FILE}'
         if (self.folder / PLANT_FILE).is_file():
             self.improved = f'{self.folder.name}/{PLANT_FILE}'
@@ -133,8 +132,8 @@ class Investigations:
     def file_of(self, secret: str) -> Path | None:
         """The page whose address has this part; None for none."""
         for one in self._all.values():
-            if secrets.compare_digest(one.secret, secret) and (one.folder / _PAGE).is_file():
-                return one.folder / _PAGE
+            if secrets.compare_digest(one.secret, secret) and (one.folder / PAGE).is_file():
+                return one.folder / PAGE
         return None
 
     def _new(self, folder: Path) -> Investigation:

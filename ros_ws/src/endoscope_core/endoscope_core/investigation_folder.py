@@ -11,6 +11,8 @@ from endoscope_core.errors import InputError
 
 LOG = 'log.json'
 """By which such a folder is known."""
+PAGE = 'index.html'
+"""What is known so far, to be read."""
 _UNKNOWN = (errno.EBADF, errno.ENOLCK, errno.ENOTSUP)
 """A file system that tells nobody who holds a folder."""
 

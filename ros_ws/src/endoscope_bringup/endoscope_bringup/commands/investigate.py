@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_bringup.operating.actions import paused_when_interrupted
     from endoscope_bringup.operating.motions_by_lines import MotionsByLines
     from endoscope_core.errors import EndoscopeError
-    from endoscope_core.investigation_folder import held
+    from endoscope_core.investigation_folder import PAGE, held
     from endoscope_core.rig import load_rig
     from endoscope_explain.investigation import page
     from endoscope_explain.investigation.investigation import (
@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
         explain_together,
         investigate,
     )
-    from endoscope_explain.investigation.log import PAGE, Log, Stop, begun
+    from endoscope_explain.investigation.log import Log, Stop, begun
     from endoscope_nodes.client.motion_player import MotionPlayer
 
     if not (args.attended or args.lines or sys.stdin.isatty()):

@@ -10,6 +10,7 @@ import numpy as np
 
 from endoscope_core.atomic_output import write_text
 from endoscope_core.errors import NotPlayedError, RigStoppedError
+from endoscope_core.investigation_folder import PAGE
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.effects import KNOWN
 from endoscope_core.physics.plant_file import load_plant, save_plant
@@ -122,7 +123,7 @@ class _Running:
         self.log = log
         log.write(self.of.folder)
         if self.page is not None:
-            write_text(self.of.folder / logs.PAGE, self.page(log))
+            write_text(self.of.folder / PAGE, self.page(log))
 
     def record(self, motion: Motion, play: Play) -> None:
         """Have a motion played and recorded."""

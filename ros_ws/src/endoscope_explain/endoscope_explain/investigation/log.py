@@ -14,7 +14,7 @@ from endoscope_core.physics.effects import KNOWN
 from endoscope_core.physics.hooks import LINKS, TRACKER
 from endoscope_core.schema import read
 
-LOG_MD, PAGE, PLANT = 'log.md', 'index.html', 'plant.yaml'
+LOG_MD, PLANT = 'log.md', 'plant.yaml'
 COMMISSIONING = 'commissioning'
 SCHEMA = 1
 

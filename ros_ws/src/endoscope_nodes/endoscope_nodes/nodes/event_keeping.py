@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
 from endoscope_bags.errors import BagError
@@ -30,8 +29,7 @@ class EventKeeping:
     """Keeps the last seconds in memory, for the bag of a fault or of what ``recorder/mark`` says.
 
     `collect` takes what has arrived by a time, and hands it to `go_on`; `folder` is where the bags
-    go, `open_session` opens one there with metadata records, and `topic` is the name of a topic by
-    its number.
+    go, and `open_session` opens one there with metadata records.
     """
 
     def __init__(
@@ -42,10 +40,9 @@ class EventKeeping:
         collect: Callable[[int], None],
         folder: Callable[[], Path],
         open_session: Callable[[Path, Mapping[str, dict[str, str]]], RecordingSession],
-        topic: Callable[[int], str],
     ) -> None:
         self._node, self._collect, self._folder = node, collect, folder
-        self._open_session, self._topic = open_session, topic
+        self._open_session = open_session
         self.recent = RecentMessages(parameters.keep, parameters.keep_room * _MEGABYTE)
         self.keeps = parameters.keep > 0.0
         self._most = parameters.keep_bags
@@ -56,8 +53,11 @@ class EventKeeping:
         self._marks = 0
         self._last = ''
         self.state = ''  # operating state; empty before the first one is heard
+        self._supervisor = f'{node.get_namespace().rstrip("/")}/{SUPERVISOR}'
+        self._cause = ''  # of the fault that there is, as the supervisor told last
         if self.keeps:
             node.create_subscription(String, RECORDER_MARK, self._on_mark, EVENT)
+            node.create_subscription(DiagnosticArray, DIAGNOSTICS, self._on_diagnostics, EVENT)
 
     @property
     def session(self) -> RecordingSession | None:
@@ -68,13 +68,23 @@ class EventKeeping:
         """Take the operating state: one that becomes ``FAULT`` is an event."""
         before, self.state = self.state, state
         if self.keeps and before and before != state == 'FAULT':
-            self._on_event(FAULT)
+            # Of state and cause, either may come first.
+            self._on_event(FAULT, self._cause)
+        if state != 'FAULT':
+            self._cause = ''
 
     def _on_mark(self, message: String) -> None:
         self._marks += 1
         self._on_event(MARK, message.data.strip() or 'by the operator')
         # Whoever asked waits for the answer.
         self._node.diagnostics.publish()
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name == self._supervisor:
+                self._cause = {v.key: v.value for v in status.values}.get('cause', '')
+                if self._cause and self.event is not None and self.event.lacks_reason:
+                    self.event.explain(self._cause)
 
     def _on_event(self, kind: str, reason: str = '') -> None:
         """Keep what came before in a bag, or note one more event of the bag that is written."""
@@ -115,8 +125,6 @@ class EventKeeping:
         if event is None:
             return
         steady_ns = self._node.ticker.monotonic_ns()
-        if event.lacks_reason:
-            self._look_for_reason(event, arrivals)
         event.arrive(packed(arrivals), len(arrivals))
         if event.session is None:
             if not event.lacks_reason or steady_ns >= self._begins_ns:
@@ -124,17 +132,6 @@ class EventKeeping:
             return
         if event.session.full or (steady_ns >= self._ends_ns and event.caught_up):
             self._end()
-
-    def _look_for_reason(self, event: EventBag, arrivals: list[Arrival]) -> None:
-        wanted = f'{self._node.get_namespace().rstrip("/")}/{SUPERVISOR}'
-        for arrival in arrivals:
-            if self._topic(arrival.topic) != DIAGNOSTICS:
-                continue
-            told: DiagnosticArray = deserialize_message(arrival.data, DiagnosticArray)
-            for status in (s for s in told.status if s.name == wanted):
-                cause = {v.key: v.value for v in status.values}.get('cause', '')
-                if cause:
-                    event.explain(cause)
 
     def close(self) -> None:
         """Finish the bag that is being written."""

@@ -106,7 +106,6 @@ class RecorderNode(EndoscopeNode):
             collect=self._collect,
             folder=lambda: Path(self._bag or new_bag()).parent,
             open_session=self._new_session,
-            topic=lambda number: self._sources[number].name,
         )
         self._holding: set[int] = set()
         self._asked_for = p.topics != RecorderParameters().topics

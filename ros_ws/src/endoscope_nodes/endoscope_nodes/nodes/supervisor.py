@@ -118,6 +118,8 @@ class SupervisorNode(EndoscopeNode):
         elif self.machine.report_cause(name, trouble):
             self.get_logger().error(f'{OperatingState.FAULT}: {trouble}')
             self._publish()
+            # Once somebody has left a fault, nobody is told its cause any more.
+            self.diagnostics.publish()
 
     def _report(self) -> Report:
         machine = self.machine
