@@ -59,8 +59,7 @@ def composed_graph_is_carried(seconds: float) -> bool:
         graph.enable()
         graph.serve(_SETTLING_S)
         pace = graph.kept_pace(seconds)
-        machine = graph.node('supervisor').machine
-        state = f'{machine.state} {machine.cause}'.strip()
+        state = graph.situation
         report = graph.node('recorder').stop()
     print(
         f'one process, 1 kHz, {pace.elapsed:.0f} s: {pace}, {report.message_count} messages '
@@ -166,6 +165,12 @@ class Composition(ClosedOnExit):
     def node(self, name: str) -> Any:
         return next(n for n in self.runtime.nodes if n.get_name() == name)
 
+    @property
+    def situation(self) -> str:
+        """Operating state, and the cause of a fault."""
+        machine = self.node('supervisor').machine
+        return f'{machine.state} {machine.cause}'.strip()
+
     def enable(self) -> None:
         machine = self.node('supervisor').machine
         deadline = time.monotonic() + self._PATIENCE_S
@@ -193,10 +198,8 @@ class Composition(ClosedOnExit):
         elapsed, cpu = time.monotonic() - began, time.process_time() - cpu
         ticks, missed = ticker.ticks - ticks, ticker.missed - missed
         if not latency:
-            machine = self.node('supervisor').machine
             raise EndoscopeError(
-                f'no command reached the motors: {machine.state} {machine.cause}'.rstrip()
-                + '; give the graph an idle machine'
+                f'no command reached the motors: {self.situation}; give the graph an idle machine'
             )
         middle, late, _ = (1e-6 * each for each in spread(latency))
         return Pace(elapsed, ticks / (ticks + missed), middle, late, cpu / elapsed)

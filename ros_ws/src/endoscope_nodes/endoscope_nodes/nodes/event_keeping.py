@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
 from endoscope_bags.errors import BagError
@@ -22,7 +23,8 @@ _MEGABYTE = 1_000_000
 _AFTER_NS = 2 * _SECOND
 """How long the bag of an event goes on after the last of its events."""
 _REASON_NS = 1_500_000_000
-"""How long the reason of a fault, which the supervisor tells every second, is waited for."""
+"""How long the reason of a fault is waited for, which the supervisor tells at once and again every
+second."""
 
 
 class EventKeeping:
@@ -57,7 +59,9 @@ class EventKeeping:
         self._cause = ''  # of the fault that there is, as the supervisor told last
         if self.keeps:
             node.create_subscription(String, RECORDER_MARK, self._on_mark, EVENT)
-            node.create_subscription(DiagnosticArray, DIAGNOSTICS, self._on_diagnostics, EVENT)
+            node.create_subscription(
+                DiagnosticArray, DIAGNOSTICS, self._on_diagnostics, EVENT, raw=True
+            )
 
     @property
     def session(self) -> RecordingSession | None:
@@ -79,8 +83,13 @@ class EventKeeping:
         # Whoever asked waits for the answer.
         self._node.diagnostics.publish()
 
-    def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        for status in message.status:
+    def _on_diagnostics(self, data: bytes) -> None:
+        # One node of a dozen is listened to: reading what the others say takes a hundred times
+        # longer.
+        if self._supervisor.encode() not in data:
+            return
+        told: DiagnosticArray = deserialize_message(data, DiagnosticArray)
+        for status in told.status:
             if status.name == self._supervisor:
                 self._cause = {v.key: v.value for v in status.values}.get('cause', '')
                 if self._cause and self.event is not None and self.event.lacks_reason:
