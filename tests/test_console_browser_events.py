@@ -4,10 +4,10 @@ import time
 
 import pytest
 
-from endoscope_benchmarks.console.events import EVENTS, undergo
-from endoscope_benchmarks.console.hand import Hand
-from endoscope_benchmarks.console.relay import Relay
-from endoscope_benchmarks.console.served_console import SAME_RAD, ServedConsole
+from endoscope_lab.console.events import EVENTS, undergo
+from endoscope_lab.console.hand import Hand
+from endoscope_lab.console.relay import Relay
+from endoscope_lab.console.served_console import SAME_RAD, ServedConsole
 from endoscope_nodes.runtime.private_domain import private_domain
 
 SETTLED_S, WATCHED_S = 1.0, 0.5

@@ -7,10 +7,10 @@ from random import Random
 
 import pytest
 
-from endoscope_benchmarks.faults.process_faults import PROCESS_FAULTS, undergo
-from endoscope_benchmarks.faults.process_rig import ProcessRig
-from endoscope_benchmarks.faults.trace import HELD_S, STILL
 from endoscope_core.rig import load_rig
+from endoscope_lab.faults.process_faults import PROCESS_FAULTS, undergo
+from endoscope_lab.faults.process_rig import ProcessRig
+from endoscope_lab.faults.trace import HELD_S, STILL
 
 RATE_HZ = 250
 

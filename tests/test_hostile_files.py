@@ -12,9 +12,9 @@ import zstandard
 from endoscope_bags import BagWriter
 from endoscope_bags.cdr_encoding import encode_string
 from endoscope_bags.message_types import STRING
-from endoscope_benchmarks.hostile_files.trial import KINDS, Outcomes, try_files
 from endoscope_bringup.cli import main
 from endoscope_core.physics import PlantDescription, save_plant
+from endoscope_lab.hostile_files.trial import KINDS, Outcomes, try_files
 
 MEMORY = 2_000_000_000
 

@@ -5,8 +5,8 @@ import re
 import pytest
 from std_srvs.srv import Trigger
 
-from endoscope_benchmarks.faults.motor_faults import MOTOR_FAULTS, undergo
-from endoscope_benchmarks.faults.motor_rig import MotorRig
+from endoscope_lab.faults.motor_faults import MOTOR_FAULTS, undergo
+from endoscope_lab.faults.motor_rig import MotorRig
 from endoscope_nodes.runtime.private_domain import private_domain
 
 # The bench tries the others too.

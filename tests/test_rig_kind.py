@@ -11,11 +11,11 @@ from endoscope_bags.copying import cut
 from endoscope_bags.message_types import STRING
 from endoscope_bags.recording import rig_of_bag
 from endoscope_bags.rig_kind import kind_of_bag
-from endoscope_benchmarks.faults.motor_rig import MotorRig
 from endoscope_bringup.cli import main
 from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.physics.plant_file import plant_as_text
 from endoscope_core.rig import Kind, RigKind, digest, rig_as_text
+from endoscope_lab.faults.motor_rig import MotorRig
 from endoscope_nodes.nodes.recorder import RecorderNode
 from endoscope_nodes.runtime.private_domain import private_domain
 

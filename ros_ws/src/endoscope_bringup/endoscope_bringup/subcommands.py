@@ -16,9 +16,9 @@ from endoscope_core.errors import nearest, printable
 GROUP = 'endoscope.commands'
 """An entry point of it names a module of the same form as those of `endoscope_bringup.commands`."""
 COMES_WITH = {
-    'bench': 'endoscope_benchmarks',
+    'bench': 'endoscope_lab',
     'console': 'endoscope_console',
-    'prove': 'endoscope_benchmarks',
+    'prove': 'endoscope_lab',
 }
 """Packages of this workspace that may be left out, by the command that is missing then."""
 _SECTION = re.compile(rf'^\[{re.escape(GROUP)}\]\n((?:[^\[\n].*\n?|\n)*)', re.MULTILINE)

@@ -128,13 +128,13 @@ def test_commands_are_those_that_python_finds(kitchen, monkeypatch):
     assert commands_of_other_packages()['brew'] == 'kitchen_brew'
 
 
-def test_without_the_benchmarks_there_is_no_bench_and_one_line_says_so(monkeypatch, capsys):
+def test_without_the_lab_there_is_no_bench_and_one_line_says_so(monkeypatch, capsys):
     monkeypatch.setattr(cli, 'commands_of_other_packages', dict)
     with pytest.raises(SystemExit) as stop:
         cli.main(['bench', 'graph', '--seconds', '3'])
     assert stop.value.code == 2
     said = capsys.readouterr().err
-    assert 'endoscope_benchmarks' in said
+    assert 'endoscope_lab' in said
     assert said.count('\n') == 1
     assert 'bench' not in cli.build_parser().format_help()
 

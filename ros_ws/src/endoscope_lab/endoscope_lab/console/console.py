@@ -1,0 +1,228 @@
+"""`endoscope bench console`: how soon the slave stops, and what the console costs."""
+
+import argparse
+import json
+import math
+import os
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, suppress
+from pathlib import Path
+
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin
+
+from endoscope_lab.bench import (
+    cpu_seconds,
+    require_known,
+    spread,
+    table_head,
+    table_row,
+    today_and_machine,
+)
+from endoscope_lab.console.events import EVENTS, Outcome, undergo
+from endoscope_lab.console.hand import Hand
+from endoscope_lab.console.relay import Relay
+from endoscope_lab.console.served_console import SAME_RAD, ServedConsole
+from endoscope_nodes.runtime.private_domain import private_domain
+
+_USUAL = ('dead-man let go', 'tab closed', 'network silent', 'network cut')
+_COLUMNS = (
+    'event',
+    'N',
+    'to the last change of motor/servo_jp [ms] median, 99 %, largest',
+    'to clutch 0 [ms] median, 99 %, largest',
+    'over 150 ms',
+    'crept afterwards [mrad]',
+    'load',
+)
+_AIM_MS = 150.0
+# Without a load the last word of a motion comes within 0.05 s of the one that ends it.
+_SETTLED_S, _WATCHED_S = 0.3, 0.3
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print a row for each event and a line for each other figure; 1 if something crept."""
+    names = tuple(EVENTS) if args.only == ['all'] else tuple(args.only or _USUAL)
+    require_known('event', names, EVENTS)
+    print(f'{"real" if args.real_time else "simulated"} time, {today_and_machine()}', flush=True)
+    crept = 0
+    began_s = time.monotonic()
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        Relay() as network,
+        ServedConsole(
+            Path(folder), private_domain(), (network.address,), real_time=args.real_time
+        ) as console,
+    ):
+        network.target = console.port
+        with Hand(console, network) as hand:
+            print(f'{first_motion(hand, began_s)}\n', flush=True)
+            if args.repetitions:
+                print(table_head(*_COLUMNS), flush=True)
+            for name in names if args.repetitions else ():
+                crept += _trials(name, hand, args.repetitions)
+            if args.inputs:
+                print()
+                for line in input_latency(hand, args.inputs):
+                    print(line, flush=True)
+            if args.seconds:
+                for line in costs_with_browser(hand, args.seconds):
+                    print(line, flush=True)
+        if args.seconds:
+            for line in costs_of_viewers(console, args.seconds):
+                print(line, flush=True)
+    return 1 if crept else 0
+
+
+def _trials(name: str, hand: Hand, repetitions: int) -> int:
+    """Let an event happen again and again, and print its row; how often something crept."""
+    outcomes: list[Outcome] = []
+    try:
+        for k in range(repetitions):
+            print(f'\r{name} {k + 1} of {repetitions}', end='', file=sys.stderr, flush=True)
+            outcomes.append(undergo(EVENTS[name], hand, _SETTLED_S, _WATCHED_S))
+            EVENTS[name].is_over(hand)
+    finally:
+        # Hours of trials are not lost with a browser that ends.
+        print('\r\x1b[K', end='', file=sys.stderr)
+        if outcomes:
+            print(_row(name, outcomes), flush=True)
+    return sum(outcome.crept > SAME_RAD for outcome in outcomes)
+
+
+def _in_ms(values: Sequence[float]) -> str:
+    return ', '.join(f'{each:.0f}' for each in spread(values))
+
+
+def _row(name: str, outcomes: Sequence[Outcome]) -> str:
+    loads = [outcome.load for outcome in outcomes]
+    return table_row(
+        name,
+        len(outcomes),
+        _in_ms([max(0.0, outcome.last_change_ms) for outcome in outcomes]),
+        _in_ms([outcome.clutch_ms for outcome in outcomes]),
+        sum(max(o.clutch_ms, o.last_change_ms) > _AIM_MS for o in outcomes),
+        f'{1e3 * max(outcome.crept for outcome in outcomes):.1f}',
+        f'{min(loads):.0f} to {max(loads):.0f}',
+    )
+
+
+VIEWERS = 4
+_STILL_S = 0.3
+_DIAGNOSTICS_S = 1.5
+_PAINTED = "performance.getEntriesByName('first-contentful-paint')[0]?.startTime"
+_FRAMES = """new Promise((done) => {
+  const begin = performance.now();
+  let frames = 0;
+  const count = () => {
+    frames += 1;
+    const seconds = (performance.now() - begin) / 1000;
+    if (seconds < 5) requestAnimationFrame(count);
+    else done(frames / seconds);
+  };
+  requestAnimationFrame(count);
+})"""
+
+
+def first_motion(hand: Hand, began_s: float) -> str:
+    """Time from a start of the program, by the monotonic clock, to a slave in motion, in words."""
+    # The hand's browser was started when all nodes were heard.
+    hand.move()
+    took_s = time.monotonic() - began_s
+    painted_ms = hand.tab.value(_PAINTED)
+    hand.let_go()
+    return (
+        f'from the start of the program, and of a browser when its graph runs, to a slave in '
+        f'motion {took_s:.1f} s; first paint of the page {painted_ms:.0f} ms'
+    )
+
+
+def input_latency(hand: Hand, inputs: int) -> Iterator[str]:
+    """From a pressed key to the first change of the handle, and of ``motor/servo_jp``, in words."""
+    # The operator has Space down and the slave at rest before each.
+    console = hand.console
+    took_ms: dict[str, list[float]] = {'master/measured_js': [], 'motor/servo_jp': []}
+    while min(map(len, took_ms.values())) < inputs:
+        console.forget()
+        hand.let_go()
+        hand.hold('Space')
+        console.passes(_STILL_S)
+        if hand.moves:
+            continue
+        goals = console.motors.angles
+        key = 'ArrowLeft' if goals and goals[-1][0] > 0.0 else 'ArrowRight'
+        at_ns = time.time_ns()
+        hand.press(key)
+        console.passes(_STILL_S)
+        first = [heard.first_change_ms(at_ns) for heard in (console.handle, console.motors)]
+        if not any(map(math.isnan, first)):
+            for took, ms in zip(took_ms.values(), first, strict=True):
+                took.append(ms)
+    hand.let_go()
+    for topic, took in took_ms.items():
+        median, most, _ = spread(took)
+        yield (
+            f'key to {topic}, {inputs} inputs: median {median:.0f} ms, 99 % {most:.0f} ms, '
+            f'load average {os.getloadavg()[0]:.1f}'
+        )
+
+
+def costs_of_viewers(console: ServedConsole, seconds: float) -> Iterator[str]:
+    """In words, the server's CPU time and the graph's ticks while this machine runs no browser."""
+    yield _cost(console, seconds, 'nobody looks on')
+    with ExitStack() as stack:
+        for _ in range(VIEWERS):
+            _view(console, stack)
+        yield _cost(console, seconds, f'{VIEWERS} pages look on')
+
+
+def costs_with_browser(hand: Hand, seconds: float) -> Iterator[str]:
+    """CPU time of the server, ticks of the graph and frames of a page in a browser, in words."""
+    # The operator's page is the first client.
+    console = hand.console
+    hand.take_controls()
+    yield _cost(console, seconds, 'the browser operates')
+    hand.give_back()
+    yield _cost(console, seconds, 'the browser looks on')
+    frames = hand.tab.value(_FRAMES)
+    yield f'page: {frames:.0f} animation frames/s, load average {os.getloadavg()[0]:.1f}'
+
+
+def _cost(console: ServedConsole, seconds: float, what: str) -> str:
+    ticks, missed = _ticks(console)
+    cpu, began = cpu_seconds(console.pid), time.monotonic()
+    console.passes(seconds)
+    share = (cpu_seconds(console.pid) - cpu) / (time.monotonic() - began)
+    after, missed_after = _ticks(console)
+    made = after - ticks
+    return (
+        f'{what}: server {100 * share:.1f} % of a core, graph '
+        f'{100 * made / (made + missed_after - missed):.1f} % of its ticks, {seconds:.0f} s, '
+        f'load average {os.getloadavg()[0]:.1f}'
+    )
+
+
+def _ticks(console: ServedConsole) -> tuple[int, int]:
+    """Ticks of the graph so far, and those that it missed, as it says once a second."""
+    console.passes(_DIAGNOSTICS_S)
+    values = console.client.health['motor_driver: device'].values
+    return int(values['ticks']), int(values['missed ticks'])
+
+
+def _view(console: ServedConsole, stack: ExitStack) -> None:
+    """Look on as one more page does, and drop what comes."""
+    address = f'ws://127.0.0.1:{console.port}/telemetry'
+    socket = stack.enter_context(connect(address, origin=Origin(console.address), compression=None))
+    socket.send(json.dumps({'op': 'hello', 'token': console.viewer_token}))
+    threading.Thread(target=_drain, args=(socket,), daemon=True).start()
+
+
+def _drain(socket: ClientConnection) -> None:
+    with suppress(ConnectionClosed):
+        for _ in socket:
+            continue

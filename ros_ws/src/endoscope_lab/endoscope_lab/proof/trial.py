@@ -1,0 +1,258 @@
+"""Recordings in memory as bags with the signals of the graph."""
+
+import hashlib
+import json
+import secrets
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_bags import BagWriter, MessageStream
+from endoscope_bags.cdr_encoding import encode_joint_states
+from endoscope_bags.message_types import JOINT_STATE
+from endoscope_bags.recording import rig_record
+from endoscope_core.errors import EndoscopeError
+from endoscope_core.physics import load_plant
+from endoscope_core.physics.plant_file import plant_from_mapping, save_plant
+from endoscope_explain.case import ExplainedCase
+from endoscope_explain.observe.predicted_signals import view
+from endoscope_explain.pipeline import Sources, explain_case, read_inputs
+from endoscope_explain.recording import (
+    BENDING,
+    COMMAND,
+    MOTOR,
+    WIRES,
+    Recording,
+    Series,
+    motor_name,
+    wire_names,
+)
+from endoscope_explain.report.sentences import verdict_sentence
+from endoscope_explain.report.writing import PLANT_YAML, REPORT_HTML, provenance, write_report
+from endoscope_lab.concealed.judge import Judgement, Law, judged, statements
+from endoscope_lab.proof import SLAVE, slave
+from endoscope_lab.proof.drawing import drawn
+
+BEGIN_NS = 1_000_000_000
+"""First stamp: a simulation's clock that has run for a second."""
+
+
+def write_bag(recording: Recording, out: Path) -> None:
+    """Write commands, motors, wires and tip at their stamps; BagError if it exists or cannot be."""
+    motors = [motor_name(joint) for joint in recording.joints]
+    wires = [wire for joint in recording.joints for wire in wire_names(joint)]
+    sensors = recording.measured()
+
+    def stream(topic: str, names: list[str], **series: Series) -> MessageStream:
+        stamps = BEGIN_NS + np.rint(1e9 * next(iter(series.values())).time).astype(np.int64)
+        values = {key: s.values.reshape(len(stamps), -1) for key, s in series.items()}
+        payloads = encode_joint_states(
+            names,
+            stamps,
+            position=values.get('position'),
+            velocity=values.get('velocity'),
+            effort=values.get('effort'),
+        )
+        return MessageStream(f'/{topic}', JOINT_STATE, payloads, stamps, stamps)
+
+    shaft = {
+        key: sensors[f'shaft_{key}']
+        for key in ('position', 'velocity', 'effort')
+        if f'shaft_{key}' in sensors
+    }
+    with BagWriter(out, records=rig_record(recording.rig)) as writer:
+        writer.write_streams(
+            [
+                stream(COMMAND, motors, position=recording.command),
+                stream(MOTOR, motors, **shaft),
+                stream(WIRES, wires, effort=sensors['tension']),
+                stream(BENDING, list(recording.joints), position=sensors['bending']),
+            ]
+        )
+
+
+class BrokenSealError(EndoscopeError, ValueError):
+    """A truth is not what was sealed."""
+
+
+def seal(path: Path, truth: dict) -> str:
+    """Write a truth as JSON and return the SHA-256 of the file, in hex."""
+    # Without a number of its own a truth of few words could be guessed from its digest.
+    content = json.dumps(truth | {'salt': secrets.token_hex(16)}, indent=1, default=str)
+    path.write_text(content + '\n', encoding='utf-8')
+    return digest(path)
+
+
+def opened(path: Path, told: str) -> dict:
+    """Read a truth whose digest was told before; BrokenSealError if the file is another one now."""
+    if digest(path) != told:
+        raise BrokenSealError(f'{path}: its SHA-256 is not the one that was told: it was changed')
+    truth: dict = json.loads(path.read_text(encoding='utf-8'))
+    return truth
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of a file, in hex, as `sha256sum` prints it."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+Array = NDArray[np.float64]
+
+TRUTH, PLANT = 'sealed.json', 'described.yaml'
+RECORDING, SECOND = 'recording.mcap', 'second.mcap'
+FOLLOWED = 'followed'
+REPORT = 'report'
+PASSAGE_S = 6.0
+"""Of the second recording that is drawn."""
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A rig that was recorded, with what is concealed in it sealed."""
+
+    number: int
+    folder: Path  # with the recordings, the described plant and the sealed truth
+    sha256: str  # of the truth
+    # What is concealed; nobody looks at it until the seals are opened.
+    laws: tuple[Law, ...]
+    also: frozenset[str]  # effects and places that are neither right nor false
+    moved: float  # share of the signal that the laws move
+
+
+@dataclass(frozen=True)
+class Passage:
+    """The signal of the second recording in which most is left when only numbers are refitted."""
+
+    signal: str
+    unit: str
+    time: Array  # (N,), s
+    measured: Array  # (N,)
+    predicted: dict[str, Array]  # (N,) by the plant as described, refitted and improved
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What was said of a rig before its seal was opened."""
+
+    number: int
+    sentence: str
+    said: tuple
+    # Misfit of the second recording over its noise, of the worst signal, with the plant as
+    # described, refitted and improved.
+    before: float
+    refitted: float
+    after: float
+    passage: Passage
+    seconds: float  # that it took
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Truth beside answer."""
+
+    rig: Rig
+    answer: Answer
+    truth: dict  # as it was sealed
+    judgement: Judgement
+    # How the slave follows a motion that is planned with the plant as described, and as improved;
+    # empty of a rig that does not run.
+    tracking: dict[str, slave.Tracking] = field(default_factory=dict)
+
+
+def recorded(form: str, seed: int, number: int, effect: str | None, folder: Path) -> Rig:
+    """Draw a rig, record it twice, and seal what is concealed in it."""
+    case, truth = drawn(form, seed, number, effect)
+    folder.mkdir()
+    sha256 = seal(folder / TRUTH, {'rig': number, 'form': form, 'seed': seed} | truth)
+    save_plant(case.described, folder / PLANT)
+    if form == SLAVE:
+        motions = {RECORDING: slave.EXPLAINED, SECOND: slave.JUDGED}
+        for k, (bag, motion) in enumerate(motions.items()):
+            slave.record(case.true, motion, folder / bag, seed + k)
+    else:
+        write_bag(case.recording, folder / RECORDING)
+        write_bag(case.second, folder / SECOND)
+    return Rig(number, folder, sha256, case.laws, case.also, case.moved)
+
+
+def explained(number: int, folder: Path, command: str) -> Answer:
+    """Explain a rig from its recordings and the described plant, and write the report."""
+    plant = load_plant(folder / PLANT)
+    sources = Sources(
+        folder / RECORDING, plant, validate=folder / SECOND, quick=True, plant_file=folder / PLANT
+    )
+    inputs = read_inputs(sources)
+    case = explain_case(inputs, jobs=1)
+    case = replace(case, provenance=provenance(sources.bag, sources.plant_file, command))
+    (folder / REPORT).mkdir()
+    write_report(case, folder / REPORT)
+    explanation = case.explanation
+    plants = {
+        'nominal': explanation.nominal,
+        'refitted': explanation.refitted,
+        'augmented': case.plant,
+    }
+    assert inputs.validation is not None
+    seen = view(inputs.validation, plants)
+    worst = max(seen.signals.values(), key=lambda s: np.mean(s.residual('refitted') ** 2))
+    named = replace(explanation, verdict=case.verdict, effects=case.effects)
+    misfit = partial(_misfit, case)
+    return Answer(
+        number,
+        verdict_sentence(case),
+        statements(named),
+        misfit('nominal'),
+        misfit('refitted'),
+        misfit('augmented'),
+        Passage(worst.signal, worst.unit, worst.time, worst.measured, dict(worst.predicted)),
+        case.runtime_s,
+    )
+
+
+def compared(rig: Rig, answer: Answer) -> Outcome:
+    """Open a rig's seal and judge what was said of it; BrokenSealError if it was changed since."""
+    truth = opened(rig.folder / TRUTH, rig.sha256)
+    return Outcome(rig, answer, truth, judged(rig.laws, answer.said, rig.also))
+
+
+def followed(folder: Path, truth: dict, seed: int) -> dict[str, slave.Tracking]:
+    """Move a slave by the inverse of its plant as described, and as improved."""
+    keys = ('joints', 'sensors', 'effects')
+    true = plant_from_mapping({key: truth[key] for key in keys})
+    (folder / FOLLOWED).mkdir()
+    plants = {'nominal': folder / PLANT, 'augmented': folder / REPORT / PLANT_YAML}
+    return {
+        name: slave.tracked(true, load_plant(file), folder / FOLLOWED / name, seed + 2)
+        for name, file in plants.items()
+    }
+
+
+def telling(passage: Passage) -> Passage:
+    """The stretch of a passage in which the refitted plant is furthest off."""
+    begins = np.arange(0.0, max(passage.time[-1] - PASSAGE_S, 0.0) + 0.25, 0.5)
+    missed = np.r_[0.0, np.cumsum((passage.measured - passage.predicted['refitted']) ** 2)]
+    ends = np.searchsorted(passage.time, begins + PASSAGE_S)
+    begin = begins[np.argmax(missed[ends] - missed[np.searchsorted(passage.time, begins)])]
+    inside = (passage.time >= begin) & (passage.time <= begin + PASSAGE_S)
+    return replace(
+        passage,
+        time=passage.time[inside],
+        measured=passage.measured[inside],
+        predicted={name: values[inside] for name, values in passage.predicted.items()},
+    )
+
+
+def report_of(number: int) -> str:
+    """Path of a rig's report from the page."""
+    return f'{folder_of(number)}/{REPORT}/{REPORT_HTML}'
+
+
+def folder_of(number: int) -> str:
+    return f'rig_{number}'
+
+
+def _misfit(case: ExplainedCase, rung: str) -> float:
+    return max(fit.ratio for fit in case.validation[rung].values())

@@ -1,0 +1,224 @@
+"""`endoscope bench real`: one physics for real recordings of a flexible endoscope."""
+
+import argparse
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+from threadpoolctl import threadpool_limits
+
+from endoscope_core.atomic_output import write_text
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_explain.decide.conclusions import NOMINAL_UNITS
+from endoscope_explain.report.numbers import MODELS, digits, in_degrees
+from endoscope_lab.bench import report, table_head, table_row
+from endoscope_lab.papers.real_recordings import models_on_real_recordings, real_recordings
+from endoscope_lab.real.explained import (
+    Number,
+    State,
+    Tubes,
+    explained_state,
+    explained_tubes,
+    numbers,
+    unknown_tubes,
+)
+from endoscope_lab.real.rig import Told
+from endoscope_lab.real.taken_out import as_table, taken_out
+from endoscope_lab.real.takes import between_cycles, require_recordings
+from endoscope_pages import html_table, render_page
+from endoscope_pages.still_pictures import INK, STYLE, svg, thinned
+
+PAGE = 'real.html'
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the tables and write the page."""
+    require_recordings(args.folder)
+    # A fit's matrices are tall and narrow: threads would only wait for each other.
+    with threadpool_limits(1, 'blas'):
+        if args.taken_out:
+            print(as_table(taken_out(args.folder, args.jobs, report)))
+            return 0
+        tubes = explained_tubes(args.folder, args.jobs, report)
+        state = explained_state(args.folder, tubes, args.jobs, report)
+        unknown = unknown_tubes(args.folder, tubes, report)
+        box = models_on_real_recordings(real_recordings(args.folder), 'prandtl_ishlinskii', 0)
+        parts = sections(
+            tubes,
+            numbers(tubes.explained, args.jobs),
+            {str(bend): second for bend, (_, second) in box.items()},
+            state,
+            numbers([state.fit], args.jobs),
+            unknown,
+        )
+    print(as_text(parts))
+    write_text(args.out, page(parts))
+    print(f'\nPage: {args.out}')
+    return 0
+
+
+PLANTS = ('nominal', 'refitted', 'augmented')
+LINE = {
+    'measured': ('-', INK),
+    'nominal': ('-', '#c2571a'),
+    'refitted': ('--', '#2f6fb7'),
+    'augmented': ('-.', '#1a8a66'),
+}
+UNITS = {
+    **NOMINAL_UNITS,
+    **{f'{e.id}.{p.name}': p.unit for e in CATALOGUE.values() for p in e.parameters},
+}
+
+Rows = list[tuple[str, ...]]
+
+
+BETWEEN = ('two cycles differ by', 'angle, times that')
+
+
+def rmse_rows(told: Iterable[Told], extra: Mapping[str, float] | None = None) -> Rows:
+    """Rmse under each plant: deg of angle / N of the wires; then what two cycles differ by."""
+    rows = []
+    for one in told:
+        reference = between_cycles(one.take)
+        explained = one.left('augmented')
+        ratio = explained[0] / reference[0]
+        row = [one.take.name, *(_rms(one.left(name)) for name in PLANTS), _rms(reference)]
+        row.append('-' if np.isnan(ratio) else f'{ratio:.1f}')
+        if extra is not None:
+            row.append(f'{np.rad2deg(extra[one.take.name]):.2f}')
+        rows.append(tuple(row))
+    return rows
+
+
+def _rms(values: Sequence[float]) -> str:
+    if np.isnan(values[0]):
+        return '-'
+    return ' / '.join([f'{np.rad2deg(values[0]):.2f}', *(f'{v:.2f}' for v in values[1:])])
+
+
+def number_rows(numbers: Mapping[str, Sequence[Number | None]]) -> Rows:
+    """A number with its interval for each recording; angles are in degrees."""
+    rows = []
+    for name, found in numbers.items():
+        shown, unit, factor = in_degrees(name, UNITS.get(name, ''))
+        cells = []
+        for one in found:
+            value, low, high = (digits(factor * v, 3) for v in one or (np.nan,) * 3)
+            cells.append('-' if one is None else f'{value} ({low} to {high})')
+        rows.append((f'{shown} ({unit})' if unit else shown, *cells))
+    return rows
+
+
+Section = tuple[str, str, tuple[str, ...], Rows, Sequence[Told]]
+"""Title, words, header and rows of a table, and recordings that are drawn; where some are, the
+fourth column's name is that of the last plant."""
+
+
+def sections(
+    tubes: Tubes,
+    numbers: Mapping[str, Sequence[Number | None]],
+    black_box: Mapping[str, float],
+    state: State,
+    of_state: Mapping[str, Sequence[Number | None]],
+    unknown: Sequence[Told],
+) -> list[Section]:
+    """All that is said of the recordings, in order."""
+    last = 'explained' if tubes.named else f'with {" and ".join(tubes.effects)}, not named'
+    plain = ('recording', 'described', 'refitted', last, *BETWEEN)
+    names = [one.take.name for one in tubes.told]
+    first = [replace(one, begin=0.0, end=one.begin) for one in tubes.told]
+    needed = ', '.join(f'{e} {gain:.0f}' for e, gain in state.needed.items()) or 'nothing'
+    alone = '; '.join(state.alone) or 'nothing'
+    header = (*plain, 'Prandtl-Ishlinskii, angle')
+    return [
+        (
+            'Tubes, numbers',
+            f'{"; ".join(tubes.search)}. 90 % intervals.',
+            ('number', *names),
+            number_rows(numbers),
+            (),
+        ),
+        ('Tubes, first cycle', 'It was fitted.', plain, rmse_rows(first), ()),
+        (
+            'Tubes, second cycle',
+            'It was predicted.',
+            header,
+            rmse_rows(tubes.told, black_box),
+            tubes.told,
+        ),
+        (
+            'Another state of the rig, numbers',
+            f"By the tubes' effects; nats lost without each: {needed}. Alone it names {alone}.",
+            ('number', state.told[0].take.name),
+            number_rows(of_state),
+            (),
+        ),
+        (
+            'Another state of the rig',
+            'The first was fitted, others are predicted; of the last, pretension was refitted.',
+            plain,
+            rmse_rows(state.told),
+            state.told,
+        ),
+        (
+            'Unknown tubes',
+            "Only the tube's numbers were refitted, on two cycles; the others are judged.",
+            plain,
+            rmse_rows(unknown),
+            unknown,
+        ),
+    ]
+
+
+def as_text(parts: Iterable[Section]) -> str:
+    """The tables as they are printed."""
+    return '\n\n'.join(
+        '\n'.join([title, words, '', table_head(*header), *(table_row(*row) for row in rows)])
+        for title, words, header, rows, _ in parts
+    )
+
+
+def page(parts: Sequence[Section]) -> str:
+    """A page that needs no other file."""
+    shown = [
+        (title, words, html_table(header, rows, words=1), [loops(one, header[3]) for one in told])
+        for title, words, header, rows, told in parts
+    ]
+    return render_page('endoscope_lab', 'real/templates/real.html.j2', sections=shown)
+
+
+def loops(told: Told, last: str) -> str:
+    """Angle and tensions over the command, measured and as each plant predicts them (SVG)."""
+    take = told.take
+    channels = told.plants['nominal'].model.observation.channels
+    curves = {name: told.plants[name].predicted() for name in PLANTS}
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(11.0, 3.3), layout='constrained')
+        axes = figure.subplots(1, len(channels), squeeze=False)[0]
+        order = [len(channels) - 1, *range(len(channels) - 1)]
+        for axis, k in zip(axes, order, strict=True):
+            channel = channels[k]
+            seen = channel.time >= told.begin
+            factor = np.rad2deg(1.0) if channel.quantity == 'bending' else 1.0
+            command = np.rad2deg(np.interp(channel.time, take.time, take.command))
+            for name, values in (
+                ('measured', channel.value),
+                *((n, c[k]) for n, c in curves.items()),
+            ):
+                axis.plot(
+                    *thinned(command[seen], factor * values[seen]),
+                    LINE[name][0],
+                    color=LINE[name][1],
+                    lw=2.2 if name == 'measured' else 1.0,
+                    zorder=1 if name == 'measured' else 2,
+                    label=last if name == 'augmented' else MODELS.get(name, name),
+                )
+            unit = 'deg' if channel.quantity == 'bending' else 'N'
+            axis.set_title(f'{take.name}: {channel.signal.partition(":")[2]} ({unit})')
+            axis.set_xlabel('command (deg)')
+        figure.legend(
+            *axes[0].get_legend_handles_labels(), loc='outside upper right', ncols=4, fontsize=8
+        )
+        return svg(figure)

@@ -1,0 +1,41 @@
+"""The shipped classifiers judge tubes that they have not seen."""
+
+import numpy as np
+import pytest
+
+from endoscope_core.classifier.classification import UnseenTensionError
+from endoscope_core.classifier.held_out_calibration import STRANGE
+from endoscope_core.classifier.weights_file import load_classifier
+from endoscope_core.dataset import record_calibration
+from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
+from endoscope_lab.papers.tracking_trial import never_seen_tube
+
+
+@pytest.fixture(scope='module', params=CALIBRATION_MOTIONS)
+def shipped(request):
+    return load_classifier(motion=request.param)
+
+
+@pytest.mark.parametrize('size_deg', [42.0, 57.0, 73.5, 88.0, 101.0])
+def test_it_regresses_the_size_of_a_tube_it_has_not_seen(shipped, size_deg):
+    tube = never_seen_tube(0, int(10 * size_deg), size_deg)
+    tension = record_calibration(tube.plant, 5, calibration_motion(shipped.motion)).tension
+    result = shipped.classify(tension)
+    assert np.rad2deg(result.size) == pytest.approx(size_deg, abs=3.0)
+    low, high = result.interval
+    assert low < result.size < high
+    assert np.rad2deg(high - low) < 10.0
+    assert abs(result.class_deg - size_deg) < 8.0
+    assert result.probability == max(result.probabilities.values())
+    assert sum(result.probabilities.values()) == pytest.approx(1.0)
+    assert result.expected_size == result.size
+
+
+@pytest.mark.parametrize('kind', STRANGE)
+def test_unusual_tensions_are_refused_with_a_reason(shipped, kind):
+    generator = np.random.default_rng(3)
+    motion = calibration_motion(shipped.motion)
+    tension = record_calibration(never_seen_tube(0, 70, 70.0).plant, 5, motion).tension
+    tension = STRANGE[kind](tension.astype(np.float32), generator)
+    with pytest.raises(UnseenTensionError, match='none of the classes: '):
+        shipped.classify(tension)

@@ -1,0 +1,103 @@
+"""Concealed rigs that are asked for motions: what is played, and what counts."""
+
+import time
+
+import numpy as np
+import pytest
+
+from endoscope_bringup import cli
+from endoscope_core.physics import PlantDescription
+from endoscope_core.rig import shipped_rig
+from endoscope_core.signals.command_file import JOINTS, CommandTable
+from endoscope_explain.investigation.motions import Motion, commissioning, require_allowed
+from endoscope_explain.takes import recordings_joined
+from endoscope_lab.concealed.trial import failed
+from endoscope_lab.investigate import (
+    ASKED,
+    COMMISSIONED,
+    FIXED,
+    KINDS,
+    Asked,
+    SimulatedRig,
+    asked,
+    drawn_rig,
+    fixed_motion,
+    kind_of,
+    table,
+)
+
+RIG = shipped_rig()
+
+
+def test_one_rig_in_four_has_two_effects_and_two_are_of_the_other_simulator():
+    kinds = [kind_of(seed) for seed in range(1, 5)]
+    assert kinds == ['other_simulator', 'catalogue', 'other_simulator', 'pairs']
+    assert kinds == [kind_of(seed) for seed in range(8001, 8005)]
+
+
+@pytest.mark.parametrize('stratum', KINDS.values())
+def test_a_rig_goes_on_from_one_motion_to_the_next(stratum):
+    case, read = drawn_rig(stratum, 1)
+    joints = case.true.joint_names()
+    time = np.arange(0.0, 3.0, 0.01)
+    wave = np.sin(2.0 * time) * np.minimum(1.0, 3.0 - time)
+    table = CommandTable(JOINTS, time, np.column_stack([0.5 * wave, 0.2 * wave]))
+    rig = SimulatedRig(case, read, np.inf)
+    recordings = [rig.recorded(table, name) for name in ('first', 'second')]
+    for one in recordings:
+        assert one.joints == joints
+        assert one.command.time[0] == one.bending.time[0] == 0.0
+        np.testing.assert_allclose(one.command.values[:, 0], RIG.joints.gear * 0.5 * wave_of(one))
+    first, second = (one.tension.values for one in recordings)
+    # A sheath remembers where it has been.
+    assert np.abs(first[:20] - second[:20]).max() > 0.2
+    # What was read then is what is read when all of it is done as one.
+    joined = recordings_joined(recordings)
+    again = read(joined_command(joined))
+    begin = round(joined.restarts[0].time / 1e-3)
+    clean = again.tension[begin : begin + len(second)]
+    assert np.abs(second - clean).max() < 8.0 * case.true.sensors.load_cell_noise
+    same = SimulatedRig(*drawn_rig(stratum, 1), np.inf).recorded(table, 'first')
+    np.testing.assert_array_equal(same.tension.values, first)
+
+
+def wave_of(recording):
+    time = np.arange(0.0, 3.0, 0.01)
+    wave = np.sin(2.0 * time) * np.minimum(1.0, 3.0 - time)
+    return np.interp(recording.command.time, time, wave)
+
+
+def joined_command(recording):
+    """The shaft's command every ms, each in force until the next one."""
+    time = recording.command.time
+    ticks = np.arange(0.0, time[-1] + 5e-4, 1e-3)
+    return recording.command.values[np.searchsorted(time, ticks + 1e-6, side='right') - 1]
+
+
+@pytest.mark.parametrize('joints', [('bend_x',), ('bend_x', 'bend_y')])
+def test_the_fixed_motion_is_allowed_and_begins_as_the_asked_one(joints):
+    plant = PlantDescription().of_joints(joints)
+    first = commissioning(plant, RIG)
+    longer = fixed_motion(first, 3.0 * first.duration)
+    assert longer.time[-1] == pytest.approx(3.0 * first.duration, abs=1.5)
+    np.testing.assert_array_equal(longer.angle[: len(first.table.time)], first.table.angle)
+    require_allowed(Motion(FIXED, '', '', longer), RIG)
+    moved = np.abs(longer.angle[len(first.table.time) :]).max(axis=0) > 0.1
+    assert moved.tolist() == [joint in joints for joint in longer.joints]
+
+
+def test_a_rig_that_failed_is_wrong_by_every_way():
+    row = vars(failed('pairs', 4, RuntimeError('why')))
+    rows = [Asked(**row, by=by) for by in (COMMISSIONED, ASKED, FIXED)]
+    lines = table(rows).splitlines()
+    assert [line.split(' | ')[0] for line in lines[2:]] == ['| two effects'] * 3 + ['| all'] * 3
+    assert all(' | 0 % | ' in line for line in lines[2:])
+
+
+def test_what_was_not_begun_in_time_is_not_counted(capsys, tmp_path):
+    assert asked('catalogue', 2, 1.0, time.time() - 1.0, None) == []
+    rows = tmp_path / 'rows.jsonl'
+    words = ['bench', 'investigate', '--seeds', '2', '--minutes', '0', '--json', str(rows)]
+    assert cli.main(words) == 0
+    assert '0 of 1 rigs' in capsys.readouterr().out
+    assert not rows.exists()

@@ -1,0 +1,66 @@
+"""The record of explained cases: what is kept, and what a later run differs in."""
+
+from dataclasses import replace
+
+import pytest
+
+from endoscope_bringup.cli import main
+from endoscope_core.errors import EndoscopeError
+from endoscope_lab.bench import keep_row
+from endoscope_lab.concealed.trial import differences, failed, rows_of
+
+ROW = replace(
+    failed('sinusoid', 7, ValueError('a test')),
+    verdict='missing_physics',
+    said=('gravity@bend_x',),
+    nominal=60.0,
+    refitted=7.0,
+    augmented=1.05,
+    held=15,
+    intervals=16,
+    errors=(1.0, 0.2),
+)
+
+
+@pytest.fixture
+def record(tmp_path):
+    file = tmp_path / 'rows.jsonl'
+    keep_row(file, ROW)
+    return file
+
+
+def test_a_row_is_read_as_it_was_kept(record):
+    keep_row(record, replace(ROW, seed=8))
+    assert {key: row.said for key, row in rows_of(record).items()} == {
+        ('sinusoid', 7): ROW.said,
+        ('sinusoid', 8): ROW.said,
+    }
+    assert rows_of(record)['sinusoid', 7].errors == ROW.errors
+
+
+def test_a_line_that_was_cut_is_named(record):
+    record.write_text(record.read_text() + '{"stratum": "nul')
+    with pytest.raises(EndoscopeError, match=r'rows\.jsonl, line 2: no row of a case'):
+        rows_of(record)
+
+
+def test_what_differs_is_said():
+    assert not list(differences(ROW, replace(ROW, augmented=1.06, seconds=3.0)))
+    other = replace(ROW, verdict='consistent', said=(), augmented=1.2, held=14)
+    assert list(differences(ROW, other)) == [
+        'verdict missing_physics -> consistent',
+        'said gravity@bend_x -> nothing',
+        'second recording, augmented: 1.05 -> 1.2',
+        'intervals that hold: 15 of 16 -> 14 of 16',
+    ]
+
+
+def test_a_run_goes_on_where_it_was_stopped_and_says_what_differs(record, capsys):
+    # The rows on record say what no explanation of this case would say.
+    words = ['bench', 'concealed', '--against', str(record)]
+    assert main([*words, '--json', str(record)]) == 0, 'the case is not explained again'
+    assert '0 differences' in capsys.readouterr().out
+    fresh = record.with_name('fresh.jsonl')
+    assert main([*words, '--json', str(fresh)]) == 1
+    assert 'sinusoid 7: second recording, nominal: 60 -> ' in capsys.readouterr().out
+    assert rows_of(fresh)['sinusoid', 7].concealed
