@@ -16,7 +16,7 @@ from endoscope_bringup.subcommands import OneLineParser
 from endoscope_core.atomic_output import atomic_file, write_text
 from endoscope_core.errors import EndoscopeError
 
-HEAVY_MODULES = {'torch', 'rclpy', 'numba', 'scipy', 'matplotlib', 'sklearn', 'distributed'}
+HEAVY_MODULES = {'torch', 'rclpy', 'numba', 'scipy', 'matplotlib'}
 
 
 def _parser_running(action: Callable[[argparse.Namespace], int]) -> Callable[[], OneLineParser]:

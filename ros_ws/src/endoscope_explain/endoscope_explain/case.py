@@ -83,7 +83,7 @@ def changed_parameters(estimates: Mapping[str, NominalEstimate]) -> dict[str, No
 
 
 Ladder = Mapping[str, Mapping[str, ChannelFit]]
-"""By compared model (`nominal`, `refitted`, `augmented`, black boxes), then by signal."""
+"""By compared model (`nominal`, `refitted`, `augmented`), then by signal."""
 
 
 @dataclass(frozen=True)

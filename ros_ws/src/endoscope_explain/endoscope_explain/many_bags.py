@@ -1,4 +1,4 @@
-"""One bag or many: explained here, side by side, or on a Dask cluster."""
+"""One bag or many, explained side by side."""
 
 import csv
 import io
@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from endoscope_core.atomic_output import atomic_directory, require_free_directory
-from endoscope_core.errors import EndoscopeError, InputError
+from endoscope_core.errors import InputError
 from endoscope_core.workers import worker_pool
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
@@ -108,22 +108,19 @@ def explain_bags(
     out: Path,
     *,
     jobs: int = 2,
-    dask_address: str | None = None,
     same_physics: bool = False,
     say: Say = print,
     progress: Progress | None = None,
 ) -> dict[str, Reported]:
     """Explain bags and write their reports by the bag's name, all or none.
 
-    `out` is new or empty: one report's own folder, or that of one folder for each bag. Jobs are
-    processes on this machine; a dask scheduler's workers see the bags under the same paths. With
+    `out` is new or empty: one report's own folder, or that of one folder for each bag. With
     `same_physics` all bags show one rig, and one choice of effects has to explain all of them.
-    Nothing is written where a recording, the folder or the cluster cannot be used (EndoscopeError).
+    Nothing is written where a recording or the folder cannot be used (EndoscopeError).
     """
     require_free_directory(out)
-    if same_physics or dask_address is None:
-        sources = _prepared(sources, jobs, same_physics, progress or say)
-    if len(sources) == 1 and dask_address is None:
+    sources = _prepared(sources, jobs, same_physics, progress or say)
+    if len(sources) == 1:
         reported = explain_one(sources[0], jobs, progress)
         with atomic_directory(out) as folder:
             _write(reported, folder)
@@ -132,10 +129,7 @@ def explain_bags(
     names = unique_names([one.bag for one in sources])
     rows: dict[str, Reported] = {}
     with atomic_directory(out) as folder:
-        finished = (
-            _on_dask(sources, dask_address) if dask_address else _here(explain_one, sources, jobs)
-        )
-        for index, reported in finished:
+        for index, reported in _here(explain_one, sources, jobs):
             name = names[index]
             (folder / name).mkdir()
             _write(reported, folder / name)
@@ -252,19 +246,4 @@ def _here[Found](
     with worker_pool(min(jobs, len(sources))) as pool:
         futures = {pool.submit(explain, one): i for i, one in enumerate(sources)}
         for future in as_completed(futures):
-            yield futures[future], future.result()
-
-
-def _on_dask(sources: Sequence[Sources], address: str) -> Iterator[tuple[int, Reported]]:
-    from distributed import Client
-    from distributed import as_completed as dask_completed
-
-    try:
-        client = Client(address, timeout=5)
-    except (OSError, ValueError) as error:
-        raise EndoscopeError(f'no Dask scheduler at {address}: {error}') from error
-    with client:
-        # A report is a pure function of its sources, but nothing is gained by keeping results.
-        futures = {client.submit(explain_one, one, pure=False): i for i, one in enumerate(sources)}
-        for future in dask_completed(futures):
             yield futures[future], future.result()

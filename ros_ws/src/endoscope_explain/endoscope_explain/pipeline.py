@@ -20,7 +20,7 @@ from endoscope_explain.case import (
     combined_verdict,
     improved_plant,
 )
-from endoscope_explain.compare.ladder import confirmed_by, ladders
+from endoscope_explain.compare import confirmed_by, ladders
 from endoscope_explain.decide.given_physics import GivenJoints
 from endoscope_explain.design import propose
 from endoscope_explain.explain_recording import Progress, explain_recording
@@ -53,7 +53,7 @@ class Sources:
     baseline: Path | None = None  # a healthy recording of the same rig
     validate: Path | None = None  # a second recording of the same rig to judge on
     without: Collection[str] = ()  # topics that may be missing
-    quick: bool = False  # whether to leave out the black boxes and the next experiment
+    quick: bool = False  # whether to leave out the next experiment
     band: float = BAND  # relative tolerance of the plant's parameters
     most_effects: int = MOST_EFFECTS  # largest number of effects on a joint that are looked for
     given: GivenJoints | None = None  # the physics of each joint, if it is not to be searched
@@ -126,8 +126,7 @@ def explain_case(
     answered: Callable[[ExplainedCase], None] | None = None,
 ) -> ExplainedCase:
     """Explain a recording by `engine`, which is told what to explain as `explain_recording` is."""
-    # The case is handed to `answered` once it is explained, before it is compared with black boxes
-    # and a next experiment is looked for.
+    # The case is handed to `answered` once it is explained, before a next experiment is looked for.
     begun = time.monotonic()
     tell = progress or (lambda _: None)
     sources, audit, validation = inputs.sources, inputs.audit, inputs.validation
@@ -171,13 +170,9 @@ def explain_case(
     case = replace(case, places=_places(case), cuts=_cuts(case))
     if answered is not None:
         answered(case)
-    if not explanation.fit:
-        ladder = ladders(recording, explanation, None, black_boxes=False, jobs=jobs)[0]
-        return replace(case, ladder=ladder, runtime_s=time.monotonic() - begun)
-    if not sources.quick:
+    if explanation.fit and not sources.quick:
         case = replace(case, next_experiment=_next(case, jobs, tell))
-    tell('comparing the plants' if sources.quick else 'judging beside black boxes')
-    held_out, second = ladders(recording, explanation, validation, not sources.quick, jobs)
+    held_out, second = ladders(explanation, validation)
     return replace(case, ladder=held_out, validation=second, runtime_s=time.monotonic() - begun)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.rig import shipped_rig
-from endoscope_explain.compare.ladder import confirmed_by
+from endoscope_explain.compare import confirmed_by
 from endoscope_explain.explanation import Verdict
 from endoscope_explain.notebook.explained import Explained
 from endoscope_explain.pipeline import Inputs, Sources, explain_case

@@ -3,7 +3,7 @@
 import subprocess
 import sys
 
-NOT_FOR_NODES = {'torch', 'sklearn', 'matplotlib', 'distributed', 'endoscope_explain'}
+NOT_FOR_NODES = {'torch', 'matplotlib', 'endoscope_explain'}
 NOT_FOR_NODES |= {'scipy.signal', 'scipy.stats'}
 
 

@@ -90,14 +90,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument(
         '--jobs', type=COUNT, default=2, metavar='N', help='tasks side by side (default 2)'
     )
-    parser.add_argument(
-        '--quick', action='store_true', help='leave out the black boxes and the next experiment'
-    )
-    parser.add_argument(
-        '--dask',
-        metavar='ADDRESS',
-        help='explain several bags on the Dask cluster whose scheduler is there',
-    )
+    parser.add_argument('--quick', action='store_true', help='leave out the next experiment')
     add_json_option(parser)
 
 
@@ -132,7 +125,6 @@ def run(args: argparse.Namespace) -> int:
             sources,
             args.out,
             jobs=args.jobs,
-            dask_address=args.dask,
             same_physics=args.same_physics,
             # What is printed is then one document; all else goes beside it.
             say=partial(progress.print, file=sys.stderr if args.json else sys.stdout),

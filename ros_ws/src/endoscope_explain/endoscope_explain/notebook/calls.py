@@ -119,7 +119,7 @@ def explain(  # type: ignore[misc]
     same_physics : bool
         Whether all recordings show one rig, so that one choice of effects has to explain all.
     quick : bool
-        Whether to leave out the black boxes and the next experiment.
+        Whether to leave out the next experiment.
     jobs : int
         Processes side by side.
     progress : callable, optional

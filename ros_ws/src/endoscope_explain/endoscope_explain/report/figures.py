@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from endoscope_explain.case import Ladder, NextExperiment
 from endoscope_explain.explanation import NINETY_PERCENT, UnknownTerm
-from endoscope_explain.report.numbers import MODELS, digits, in_degrees
+from endoscope_explain.report.numbers import PLANTS, digits, in_degrees
 from endoscope_explain.report.sentences import LEAST_SHARE, plain
 from endoscope_pages import Curve, Plot, figure_html
 
@@ -20,8 +20,6 @@ COLOUR = {
     'nominal': 'curve-2',
     'refitted': 'curve-1',
     'augmented': 'curve-4',
-    'gaussian_process': 'curve-3',
-    'neural_network': 'curve-5',
 }
 """Names of look.css."""
 
@@ -33,7 +31,7 @@ DASH: dict[str, tuple[float, ...]] = {
 }
 """Dashes let a curve that nearly coincides with another one be seen."""
 
-LABEL = {'measured': 'measured', **MODELS}
+LABEL = {'measured': 'measured', **PLANTS}
 
 
 def look(name: str) -> dict[str, Any]:
@@ -118,12 +116,9 @@ MARKERS = {
     'nominal': 'M-4.5 0A4.5 4.5 0 1 0 4.5 0A4.5 4.5 0 1 0-4.5 0Z',
     'refitted': 'M-4-4H4V4H-4Z',
     'augmented': 'M0-6L6 0L0 6L-6 0Z',
-    'gaussian_process': 'M0-5.5L5.5 4.5H-5.5Z',
-    'neural_network': 'M0 5.5L5.5-4.5H-5.5Z',
 }
 """Paths around the origin, px."""
 
-HOLLOW = ('gaussian_process', 'neural_network')
 LEAST = 0.1
 """What is less than this share of the noise is drawn here."""
 
@@ -178,15 +173,14 @@ def ladder_figure(ladder: Ladder) -> str:
 
 
 def _keys(compared: list[str]) -> str:
-    """The legend, in one line above the rows, further left where it is long."""
-    widths = [44.0 + 8.2 * len(LABEL[name]) for name in compared]
-    drawn, x = [], min(LEFT, WIDTH - sum(widths))
-    for name, width in zip(compared, widths, strict=True):
+    """The legend, in one line above the rows."""
+    drawn, x = [], LEFT
+    for name in compared:
         drawn.append(
             f'{_marker(name, x + 6, 14, LABEL[name])}<text x="{x + 18:g}" y="19">'
             f'{escape(LABEL[name])}</text>'
         )
-        x += width
+        x += 44.0 + 8.2 * len(LABEL[name])
     return ''.join(drawn)
 
 
@@ -194,7 +188,7 @@ def _marker(name: str, x: float, y: float, said: str) -> str:
     colour = f'var(--{COLOUR[name]})'
     return (
         f'<path d="{MARKERS[name]}" transform="translate({x:.1f} {y:.1f})" stroke="{colour}" '
-        f'stroke-width="1.5" fill="{"none" if name in HOLLOW else colour}">'
+        f'stroke-width="1.5" fill="{colour}">'
         f'<title>{escape(said)}</title></path>'
     )
 

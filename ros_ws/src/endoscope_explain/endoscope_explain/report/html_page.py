@@ -200,7 +200,7 @@ def _tables(case: ExplainedCase, ladder: Ladder) -> list[dict[str, Any]]:
     return [
         {
             'title': title,
-            'models': [numbers.MODELS[name] for name in models],
+            'models': [numbers.PLANTS[name] for name in models],
             'rows': [_row(signal, models) for signal in next(iter(models.values()))],
         }
         for title, models in titled.items()

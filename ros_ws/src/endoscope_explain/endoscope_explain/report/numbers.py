@@ -11,11 +11,6 @@ from endoscope_explain.recording import MOVES_RAD, QUANTITY_UNITS, Recording, si
 
 PLANTS = {'nominal': 'described', 'refitted': 'refitted', 'augmented': 'improved'}
 """The one word for each plant of report.json."""
-MODELS = {
-    **PLANTS,
-    'gaussian_process': 'Gaussian process (black box)',
-    'neural_network': 'neural network (black box)',
-}
 
 
 @dataclass(frozen=True)
@@ -95,7 +90,7 @@ def moving_joints(recording: Recording) -> tuple[str, ...]:
 
 def models(ladder: Ladder) -> tuple[str, ...]:
     """Models of a ladder in their order; a plant that is the one before it comes once."""
-    found = [name for name in MODELS if ladder.get(name)]
+    found = [name for name in PLANTS if ladder.get(name)]
     if 'augmented' in found and ladder['augmented'] == ladder.get('refitted'):
         found.remove('augmented')
     return tuple(found)

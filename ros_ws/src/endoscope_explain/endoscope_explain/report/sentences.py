@@ -335,7 +335,7 @@ def told(case: ExplainedCase) -> str:
 
 def fits_table(case: ExplainedCase) -> tuple[tuple[str, ...], list[tuple[str, ...]]] | None:
     """Misfit over noise of each signal by each plant: heads and rows; None where none was made."""
-    plants = {name: fits for name, fits in judged(case, case.ladder).items() if name in PLANTS}
+    plants = judged(case, case.ladder)
     if not plants.get('nominal'):
         return None
     rows = [

@@ -12,7 +12,8 @@ from threadpoolctl import threadpool_limits
 from endoscope_core.atomic_output import write_text
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.decide.conclusions import NOMINAL_UNITS
-from endoscope_explain.report.numbers import MODELS, digits, in_degrees
+from endoscope_explain.report.numbers import PLANTS as LABEL
+from endoscope_explain.report.numbers import digits, in_degrees
 from endoscope_lab.bench import report, table_head, table_row
 from endoscope_lab.papers.real_recordings import models_on_real_recordings, real_recordings
 from endoscope_lab.real.explained import (
@@ -213,7 +214,7 @@ def loops(told: Told, last: str) -> str:
                     color=LINE[name][1],
                     lw=2.2 if name == 'measured' else 1.0,
                     zorder=1 if name == 'measured' else 2,
-                    label=last if name == 'augmented' else MODELS.get(name, name),
+                    label=last if name == 'augmented' else LABEL.get(name, name),
                 )
             unit = 'deg' if channel.quantity == 'bending' else 'N'
             axis.set_title(f'{take.name}: {channel.signal.partition(":")[2]} ({unit})')

@@ -1,18 +1,16 @@
-"""The ladder of fits beside black boxes, and whether a second recording confirms what was named."""
+"""How well each plant does on data that no fit has seen, and what a second recording confirms."""
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t
 
 from endoscope_core.physics.layout import IN_COMMAND
 from endoscope_explain.case import Ladder
-from endoscope_explain.compare.black_boxes import Exam, black_box_fits
-from endoscope_explain.explanation import ChannelFit, Explanation, NamedEffect
-from endoscope_explain.fit.evidence import BLOCK_S, fitted_at, judged_at
+from endoscope_explain.explanation import Explanation, NamedEffect
+from endoscope_explain.fit.evidence import BLOCK_S
 from endoscope_explain.observe.predicted_signals import RecordedView, fits_by, view
 from endoscope_explain.recording import MOVES_RAD, Recording
 from endoscope_explain.search.levels import FALSE_ALARMS
@@ -76,48 +74,13 @@ def chance_of_no_gain(seen: RecordedView, joints: Collection[str]) -> float:
     return float(t.sf((slope - 0.5) * np.sqrt(count - 1) / spread, count - 1))
 
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
-PHYSICS = ('nominal', 'refitted', 'augmented')
+PLANTS = ('nominal', 'refitted', 'augmented')
 
 
-def ladders(
-    recording: Recording,
-    explanation: Explanation,
-    validation: Recording | None,
-    black_boxes: bool,
-    jobs: int,
-) -> tuple[Ladder, Ladder]:
+def ladders(explanation: Explanation, validation: Recording | None) -> tuple[Ladder, Ladder]:
     """Judge all fits, on held-out blocks and on a second recording, if there is one."""
-    plants = {name: getattr(explanation, name) for name in PHYSICS}
-    held_out: dict[str, Mapping[str, ChannelFit]] = {
-        name: dict(explanation.fit.get(name, {})) for name in PHYSICS
-    }
-    second: dict[str, Mapping[str, ChannelFit]] = {}
-    if not held_out['nominal']:
-        return held_out, second
-    seen = None if validation is None else view(validation, plants)
-    if seen is not None:
-        second = {name: fits_by(seen, name) for name in PHYSICS}
-    if black_boxes:
-        recorded = view(recording, plants)
-        blocks = Exam(
-            lambda t: fitted_at(t - recorded.begin),
-            recording,
-            recorded,
-            lambda t: judged_at(t - recorded.begin),
-        )
-        exams = [blocks]
-        if validation is not None and seen is not None:
-            # The black boxes see all of the first recording before they are judged on the second
-            # one.
-            exams.append(Exam(_all, validation, seen, _all))
-        compared = black_box_fits(recording, recorded, exams, jobs)
-        for ladder, found in zip((held_out, second), compared, strict=False):
-            ladder.update(found)
-    return held_out, second
-
-
-def _all(time: Array) -> Mask:
-    return np.ones(len(time), bool)
+    held_out = {name: dict(explanation.fit.get(name, {})) for name in PLANTS}
+    if validation is None or not held_out['nominal']:
+        return held_out, {}
+    seen = view(validation, {name: getattr(explanation, name) for name in PLANTS})
+    return held_out, {name: fits_by(seen, name) for name in PLANTS}
