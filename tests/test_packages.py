@@ -20,10 +20,8 @@ NOT_SOURCE = {'__pycache__', '.mypy_cache', '.pytest_cache', '.ruff_cache'}
 
 # Names under which a distribution is imported, where they differ from its own.
 IMPORT_NAMES = {
-    'autora-theorist-bms': 'autora',
     'dynamixel-sdk': 'dynamixel_sdk',
     'foxglove-sdk': 'foxglove',
-    'gp-elite': 'gp_elite',
     'pyserial': 'serial',
     'pyyaml': 'yaml',
     'scikit-learn': 'sklearn',
@@ -58,7 +56,7 @@ def _declared(package: Path, *more: str) -> set[str]:
 def _locked_modules() -> set[str]:
     settings = tomllib.loads((WORKSPACE / 'pyproject.toml').read_text())
     groups = settings['dependency-groups']
-    optional = [line for group in ('viewers', 'train', 'peers') for line in groups[group]]
+    optional = [line for group in ('viewers', 'train', 'frames') for line in groups[group]]
     lines = settings['project']['dependencies'] + optional
     names = [re.split(r'[^\w-]', line, maxsplit=1)[0] for line in lines]
     return {IMPORT_NAMES.get(name, name) for name in names}

@@ -354,19 +354,6 @@ BENCHES: dict[str, Bench] = {
             _jobs(),
         ),
     ),
-    'peers': Bench(
-        'peers.trial',
-        "other people's methods on rigs with something concealed",
-        "Runs every peer on an example of its authors', then on the cases that `endoscope bench "
-        'concealed` draws, beside `endoscope explain`. Packages of peers are installed by `make -C '
-        'ros_ws peers`. Exits 1 if a peer fails on its own example.',
-        (
-            _option('--peer', '(default: all)', nargs='+', metavar='NAME'),
-            _strata('catalogue', 'mixed_forms', 'nulls'),
-            _seeds('of the cases (default: 1-3)'),
-            _jobs(),
-        ),
-    ),
     'simulate': Bench(
         'simulate',
         'how much faster than real time the plant is simulated, bare and with each effect',
