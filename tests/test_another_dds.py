@@ -27,6 +27,8 @@ from endoscope_nodes.names import (
 )
 from endoscope_nodes.nodes.instrument_model import section_of
 
+pytestmark = pytest.mark.nightly
+
 PAGE = WORKSPACE / 'doc/other_programs.md'
 STREAMS = {MOTOR_MEASURED: MOTORS, WIRES_MEASURED: WIRES, SLAVE_MEASURED: JOINTS}
 ENOUGH = {MOTOR_MEASURED: 500, WIRES_MEASURED: 500, SLAVE_MEASURED: 40}

@@ -17,6 +17,8 @@ from sksurgerynditracker.nditracker import NDITracker
 
 from endoscope_emulators.aurora import InstrumentInField
 
+pytestmark = pytest.mark.nightly
+
 BENDING = (0.5, -0.2)
 
 

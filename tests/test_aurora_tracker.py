@@ -89,6 +89,7 @@ def test_each_frame_comes_once_with_the_time_at_which_it_was_measured(tracker, e
     assert are_well_timed(emulator, tracker, readings)
 
 
+@pytest.mark.nightly
 def test_a_frame_that_was_not_asked_for_is_counted_as_lost(tracker, emulator):
     collect(tracker, 5)
     before = figure(tracker, 'lost frames')
@@ -116,6 +117,7 @@ def test_a_sensor_out_of_volume_is_no_reading(tracker, instrument):
     until(lambda: tracker.health()[0] == '')
 
 
+@pytest.mark.nightly
 def test_a_broken_sensor_is_said(tracker, instrument):
     collect(tracker, 5)
     instrument.broken = True
@@ -147,6 +149,7 @@ def test_a_tracker_left_at_another_rate_is_reset_by_a_break(emulator):
     assert emulator.unit.baud == 9600
 
 
+@pytest.mark.nightly
 def test_a_late_reply_keeps_its_frame_and_is_left_out(tracker, emulator):
     collect(tracker, 20)
     number = [0]
@@ -160,6 +163,7 @@ def test_a_late_reply_keeps_its_frame_and_is_left_out(tracker, emulator):
     assert are_well_timed(emulator, tracker, collect(tracker, 10))
 
 
+@pytest.mark.nightly
 def test_a_tracker_whose_frames_come_late_for_good_is_timed_anew(tracker, emulator):
     collect(tracker, 20)
     begun = time.monotonic()
@@ -171,6 +175,7 @@ def test_a_tracker_whose_frames_come_late_for_good_is_timed_anew(tracker, emulat
     until(lambda: tracker.health()[0] == '')
 
 
+@pytest.mark.nightly
 def test_old_replies_are_told_by_their_frame_and_left_out(tracker, emulator, instrument):
     """The instrument turns all the while; every fourth reply is an earlier one again."""
     instrument._bent.bending = lambda seconds: (0.5 * math.sin(seconds), 0.0)
@@ -195,6 +200,7 @@ def test_old_replies_are_told_by_their_frame_and_left_out(tracker, emulator, ins
     assert figure(tracker, 'connections') == 1 or figure(tracker, 'silences') >= 5
 
 
+@pytest.mark.nightly
 def test_a_tracker_that_counts_its_frames_anew_is_opened_again(tracker, emulator):
     unit = emulator.unit
     until(lambda: [r for r in tracker.take() if r.frame > 20])
@@ -242,6 +248,7 @@ def test_frames_ahead_of_their_time_and_poses_that_no_tip_reaches_are_left_out(
     assert are_well_timed(emulator, tracker, collect(tracker, 20))
 
 
+@pytest.mark.nightly
 def test_a_missing_sensor_is_named(tmp_path, instrument):
     with AuroraEmulator([instrument], tmp_path / 'tty') as emulator:
         tracker = AuroraTracker(str(emulator.link), TrackerSettings(tool=2))
@@ -314,6 +321,7 @@ def spoilt(data, rng):
     return bytes(bad)
 
 
+@pytest.mark.nightly
 def test_no_wrong_value_in_10000_spoilt_replies(tmp_path):
     rng = random.Random(20261121)
     asked = [0]

@@ -13,6 +13,8 @@ from endoscope_nodes.names import CALIBRATION_RESULT
 from endoscope_nodes.nodes.calibration import CalibrationNode
 from endoscope_nodes.runtime.qos import RESULT
 
+pytestmark = pytest.mark.nightly
+
 CELL_RATE, TICK_RATE = 500, 250
 SIZE_DEG = 80
 LONGEST_S = 600.0

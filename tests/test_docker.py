@@ -18,6 +18,8 @@ from endoscope_nodes.program import PROGRAMS
 from endoscope_nodes.runtime.node_parameters import OF_NODE, BeatParameters
 from endoscope_nodes.runtime.parameters import described
 
+pytestmark = pytest.mark.nightly
+
 ROOT = Path(__file__).parents[1]
 COMPOSE_FILE = ROOT / 'docker' / 'compose.yaml'
 HARDWARE_FILE = ROOT / 'docker' / 'hardware.yaml'

@@ -26,6 +26,8 @@ from endoscope_bags import open_bag
 from endoscope_bags.message_types import message_type
 from endoscope_nodes.topics import BY_NAME, TOPICS
 
+pytestmark = pytest.mark.nightly
+
 LAYOUT = WORKSPACE / 'src/endoscope_bringup/layouts/foxglove.json'
 PATHS = [
     (BY_NAME[topic if topic in BY_NAME else topic.removeprefix('/endoscope/')].type, fields)

@@ -74,6 +74,7 @@ def test_tensions_come_as_the_cells_show_them(line, cells, request):
     assert device.health()[0] == ''
 
 
+@pytest.mark.nightly
 def test_minimalmodbus_reads_the_same_line_to_the_same_tensions(cable, cells, calibration):
     cells.freeze = set(WIRES)
     cells.count = dict(zip(WIRES, (5120, -380, 42_620, 60_000), strict=True))
@@ -127,6 +128,7 @@ def test_flipped_bits_are_counted_and_no_number(cable, on_serial, cells):
         assert reading.tension == pytest.approx((5.0,) * 4, abs=0.0021)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ('delays', 'questions', 'more_than'), [((0.07,) + 6 * (0.0,), 60, 30), ((0.07,), 8, -1)]
 )
@@ -157,6 +159,7 @@ def test_a_late_reply_is_never_the_answer_to_a_later_question(
     assert silent > 5
 
 
+@pytest.mark.nightly
 def test_a_line_that_is_never_silent_is_given_up(tmp_path):
     over = threading.Event()
 
@@ -183,6 +186,7 @@ def test_a_line_that_is_never_silent_is_given_up(tmp_path):
             line.close()
 
 
+@pytest.mark.nightly
 def test_doubled_replies_are_noticed(cable, on_serial):
     collect(on_serial, 5)
     number = [0]
@@ -197,6 +201,7 @@ def test_doubled_replies_are_noticed(cable, on_serial):
         assert reading.tension == pytest.approx((5.0,) * 4, abs=0.0021)
 
 
+@pytest.mark.nightly
 def test_an_old_reply_that_no_wire_can_follow_is_left_out_and_counted(cable, on_serial, cells):
     """RTU replies have no number: what tells them is how far the tension has gone on."""
     kept, number = [], [0]
@@ -247,6 +252,7 @@ def test_an_unplugged_adapter_is_said_and_found_again(cable, on_serial):
     assert figure(on_serial, 'connections') == 2
 
 
+@pytest.mark.nightly
 def test_a_server_that_dies_is_said_and_found_again(calibration, cells):
     server = transmitter(cells)
     port = server.tcp_port
@@ -264,6 +270,7 @@ def test_a_server_that_dies_is_said_and_found_again(calibration, cells):
         device.close()
 
 
+@pytest.mark.nightly
 def test_a_busy_transmitter_is_refused_and_said(on_tcp, cells):
     collect(on_tcp, 5)
     cells.busy = True

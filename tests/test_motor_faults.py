@@ -12,13 +12,18 @@ from endoscope_nodes.runtime.private_domain import private_domain
 # The bench tries the others too.
 FAULTS = (
     'adapter out',
-    'disturbed',
-    'overload',
-    'restart',
-    'node hangs',
-    'over-tension',
-    'console killed',
-    'motor driver killed',
+    *(
+        pytest.param(name, marks=pytest.mark.nightly)
+        for name in (
+            'disturbed',
+            'overload',
+            'restart',
+            'node hangs',
+            'over-tension',
+            'console killed',
+            'motor driver killed',
+        )
+    ),
 )
 
 
@@ -73,6 +78,7 @@ def shafts_stand_still(rig):
     return max(track) - min(track) < 2e-3
 
 
+@pytest.mark.nightly
 def test_after_a_fault_nothing_moves_before_enable_is_given(tmp_path):
     with MotorRig(tmp_path, patience=PATIENCE_S, domain=private_domain()) as rig:
         rig.enable_and_move()

@@ -9,6 +9,8 @@ from typing import Any
 
 import pytest
 
+pytestmark = pytest.mark.nightly
+
 DOC = Path(__file__).parents[1] / 'ros_ws/doc'
 NOTEBOOK = DOC / 'notebooks/explain_a_recording.ipynb'
 

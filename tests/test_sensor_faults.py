@@ -20,6 +20,8 @@ from endoscope_emulators.cables.serial_cable import SerialCable
 from endoscope_nodes.names import OPERATING_STATE
 from endoscope_nodes.runtime.qos import RESULT
 
+pytestmark = pytest.mark.nightly
+
 CELLS = 'load_cells: cells'
 TRACKER = 'em_tracker: tracker'
 LATENCY = 0.03

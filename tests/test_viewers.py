@@ -22,6 +22,8 @@ from endoscope_nodes.graph import SHOWING_NODES
 from endoscope_nodes.nodes.instrument_model import section_of
 from endoscope_nodes.topics import RECORDED
 
+pytestmark = pytest.mark.nightly
+
 PROTOCOL = 'foxglove.sdk.v1'
 MESSAGE_DATA = 1
 DESCRIPTION = '/robot_description'

@@ -8,6 +8,8 @@ from patient_clients import PATIENCE_S, opened
 from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
 from endoscope_emulators.dynamixel.process import EmulatorProcess
 
+pytestmark = pytest.mark.nightly
+
 MOUNTS = (ServoMount('motor_x', 1), ServoMount('motor_y', 2))
 FASTEST = 4.9
 

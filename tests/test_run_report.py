@@ -1,0 +1,31 @@
+"""The plugin that knows what a test file may cost."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+COSTLY = """
+import time
+from run_report import _loop
+
+def test_costly():
+    end = time.thread_time() + 0.3 * _loop()
+    while time.thread_time() < end:
+        pass
+"""
+BUDGETS = {'test_over.py': 0.1, 'test_within.py': 0.25}
+
+
+def test_a_file_beyond_its_budget_fails_the_run(tmp_path):
+    plugin = Path(__file__).with_name('run_report.py').read_text()
+    (tmp_path / 'run_report.py').write_text(plugin.replace('NEGLIGIBLE = 5.0', 'NEGLIGIBLE = 0.0'))
+    for name in (*BUDGETS, 'test_new.py'):
+        (tmp_path / name).write_text(COSTLY)
+    (tmp_path / 'durations.json').write_text(json.dumps(BUDGETS))
+    (tmp_path / 'pytest.ini').write_text('[pytest]\n')
+    command = [sys.executable, '-m', 'pytest', '-p', 'run_report', '-q']
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 6, done.stdout
+    [said] = [line for line in done.stdout.splitlines() if 'over its budget' in line]
+    assert said.startswith('over its budget: test_over.py took')
