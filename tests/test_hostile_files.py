@@ -425,6 +425,15 @@ def test_records_that_cannot_be_are_refused_and_what_is_whole_is_saved(path, who
     one_line(path, 'another description of the same id')
 
 
+def test_what_lies_before_a_length_that_lies_is_saved(path, whole):
+    records = records_of(whole)
+    third = [k for k, record in enumerate(records) if record[0] == CHUNK][2]
+    place = len(MAGIC) + len(built(records[:third])) + 1
+    for length in (0, 7, 2**16, 2**34, 2**63):
+        path.write_bytes(whole[:place] + struct.pack('<Q', length) + whole[place + 8 :])
+        one_line(path, '.', 2 * 20)
+
+
 @pytest.mark.parametrize(
     'text', ['- 1', 'a: [', 'history: 1', '- depth: x', '9' * 5000, '[' * 9000]
 )

@@ -6,7 +6,6 @@ files that were cut off, too. Format: https://mcap.dev/spec.
 """
 
 import mmap
-import re
 import struct
 import zlib
 from collections.abc import Iterator
@@ -28,17 +27,12 @@ from endoscope_bags.mcap_records import (
     Descriptions,
     ExactStream,
 )
-from endoscope_bags.unpacking import Allowance, ChunkError, chunk_head, unpacked
+from endoscope_bags.unpacking import Allowance, ChunkError, unpacked
 
 UNSURE_NAMES = 'the names of topics agree with no checksum'
 _CRC_STEP = 1 << 24
 _MOST_DAMAGE = 100
 _LOOKED_AT = 512
-# How many records must follow each other, end to head, to be taken for records in a damaged file.
-_CHAIN = 3
-# Where a record may begin: an opcode, and a length below 4 GiB.
-_PERHAPS_RECORD = re.compile(rb'(?=[\x01-\x0f].{4}\x00{4})', re.DOTALL)
-
 
 IntArray = npt.NDArray[np.int64]
 
@@ -81,7 +75,6 @@ class McapScan:
     # By name; the last record of a name counts.
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     damage: list[str] = field(default_factory=list)  # one line each; empty for a sound file
-    truncated: bool = False  # the end of the file is missing
 
     def block_data(self, indices: npt.NDArray[np.int64]) -> Iterator[tuple[int, bytes]]:
         """Read blocks again and yield each with its index, decompressed."""
@@ -147,11 +140,8 @@ class _Pass:
         self._summary_holds = False
         self._corrupt = False  # beyond that the end of the file is missing
         self._n_chunks = 0
-        self._chunked = False
         # Channels that the checksum of a chunk vouches for.
         self._in_chunks: set[int] = set()
-        # Nothing before this byte is looked through for records again: chunks contain some.
-        self._trusted = 0
         self._heads: list[npt.NDArray[np.void]] = []
         self._starts: list[IntArray] = []
         self._blocks: list[int] = []
@@ -162,22 +152,15 @@ class _Pass:
         whole_head = self._data[:position] == MAGIC
         if not whole_head:
             self._damaged('the first bytes are not those of an MCAP recording')
-        before, ended = position, False
+        ended = False
         while not ended:
             record = self._record(position)
             if record is None:
-                found = self._next_record(max(before + 1, self._trusted)) if self._salvage else None
-                if found is None:
-                    self._truncated(position)
-                    break
-                if found < position and self._loose and self._loose[-1] == before:
-                    self._loose.pop()
-                self._end_loose_messages(min(found, position))
-                self._damaged(f'no records at byte {position}, up to {found}')
-                before = position = found
-                continue
+                self._truncated(position)
+                break
             opcode, start, stop = record
-            if opcode == Opcode.MESSAGE and self._chunked:
+            if opcode == Opcode.MESSAGE and self._salvage and self._n_chunks:
+                # Behind a length that lies: a piece of a chunk, which no checksum covers.
                 self._damaged(f'a message by itself at byte {start}')
             elif opcode == Opcode.MESSAGE and stop - start >= MESSAGE_HEAD_LENGTH:
                 self._loose.append(position)
@@ -185,7 +168,7 @@ class _Pass:
                 self._end_loose_messages(position)
                 self._other(opcode, start, stop)
                 ended = opcode == Opcode.FOOTER
-            before, position = position, stop
+            position = stop
         if ended and self._data[position : position + len(MAGIC)] != MAGIC:
             self._truncated(position)
         self._end_loose_messages(position)
@@ -203,47 +186,9 @@ class _Pass:
         # A crash of the machine leaves zeros where the file had grown but was not written.
         if opcode == 0 or start + length > len(self._data):
             return None
-        if opcode == Opcode.CHUNK and self._salvage:
-            self._chunked = True
-            try:
-                chunk_head(self._data, start, start + length)
-            except ChunkError:
-                return None
         return opcode, start, start + length
 
-    def _next_record(self, begin: int) -> int | None:
-        """Where the next records of a damaged file begin that make a chain."""
-        for match in _PERHAPS_RECORD.finditer(self._data, begin):
-            if self._chained(match.start()):
-                return match.start()
-        return None
-
-    def _chained(self, position: int) -> bool:
-        for _ in range(_CHAIN):
-            if self._data[position : position + len(MAGIC) + 1] == MAGIC:
-                return True
-            record = self._record(position)
-            if record is None or record[0] > Opcode.DATA_END:
-                return False
-            opcode, start, stop = record
-            if opcode == Opcode.MESSAGE and not self._is_of_known_channel(start, stop):
-                return False
-            if opcode == Opcode.CHUNK:
-                return True
-            if opcode == Opcode.FOOTER:
-                return stop - start == 20
-            position = stop
-        return True
-
-    def _is_of_known_channel(self, start: int, stop: int) -> bool:
-        # Where there are chunks, a message by itself is a piece of one that no checksum covers.
-        if self._chunked:
-            return False
-        channel = int.from_bytes(self._data[start : start + 2], 'little')
-        return stop - start >= MESSAGE_HEAD_LENGTH and channel in self._written.channels
-
     def _truncated(self, position: int) -> None:
-        self.scan.truncated = True
         self._note(f'ends in the middle, after {position} sound bytes of {len(self._data)}')
 
     def _damaged(self, what: str) -> None:
@@ -340,8 +285,6 @@ class _Pass:
     def _chunk(self, start: int, stop: int) -> None:
         self._n_chunks += 1
         try:
-            chunk_head(self._data, start, stop)
-            self._trusted = stop
             records = unpacked(self._data[start:stop], self._allowance)
             positions = self._message_positions(records)
         except ChunkError as error:

@@ -29,7 +29,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'gap if messages are missing there, or if nothing tells that none are. Lost are messages '
         'that were published and did not arrive ("?" where the recorder did not tell).',
     )
-    info.add_argument('bag', metavar='BAG', type=Path, help='rosbag2 folder, .mcap or .db3 file')
+    info.add_argument('bag', metavar='BAG', type=Path, help='rosbag2 folder or .mcap file')
     add_json_option(info)
     cut = actions.add_parser(
         'cut',
@@ -37,7 +37,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         description='Writes what was received from one time to another. Of latched topics the last '
         'message before comes first, so that what was in force is known.',
     )
-    cut.add_argument('bag', metavar='BAG', type=Path, help='rosbag2 folder, .mcap or .db3 file')
+    cut.add_argument('bag', metavar='BAG', type=Path, help='rosbag2 folder or .mcap file')
     cut.add_argument(
         '--from',
         dest='begin',
@@ -57,7 +57,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     recover = actions.add_parser(
         'recover',
         help='write the sound part of a damaged recording to a new one',
-        description='Saves every sound chunk of a recording that was cut off or damaged.',
+        description='Saves every sound chunk of a damaged recording, up to where its records break '
+        'off.',
     )
     recover.add_argument('bag', metavar='BAG', type=Path, help='rosbag2 folder or .mcap file')
     recover.add_argument('out', metavar='OUT', type=Path, help='the new recording')

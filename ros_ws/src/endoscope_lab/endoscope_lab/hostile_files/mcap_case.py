@@ -118,14 +118,19 @@ class McapCase:
 
 
 def untouched_messages(data: bytes, places: Sequence[int]) -> set[Message]:
-    """Messages of a sound recording that must survive the change of bytes at some places."""
+    """Messages of a sound recording that must survive the change of bytes at some places.
+
+    Behind a record whose length was changed nothing has to be found.
+    """
     due: set[Message] = set()
     position = len(MAGIC)
     touched: list[bool] = []
     records = _parsed(data)
+    lost = False
     for _, body in records:
         stop = position + 9 + len(body)
-        touched.append(any(position <= place < stop for place in places))
+        lost = lost or any(position <= place < position + 9 for place in places)
+        touched.append(lost or any(position <= place < stop for place in places))
         position = stop
     end = next(k for k, (opcode, _) in enumerate(records) if opcode == _DATA_END)
     described = not any(
