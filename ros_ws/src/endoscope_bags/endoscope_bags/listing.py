@@ -10,13 +10,12 @@ import numpy as np
 from endoscope_bags.errors import BagError, BagNotFoundError
 from endoscope_bags.event_bag import Event, events_of
 from endoscope_bags.mcap_summary import McapSummary, read_summary
-from endoscope_bags.metadata import bag_files
+from endoscope_bags.metadata import SQLITE3, bag_files
 from endoscope_bags.recording import open_bag
-from endoscope_bags.sqlite3_scan import is_sqlite3
 from endoscope_core.errors import EndoscopeError, printable
 
 RECORDING = 'recording'
-_SUFFIXES = ('.mcap', '.db3')
+_SUFFIXES = ('.mcap', SQLITE3)
 
 
 @dataclass(frozen=True)
@@ -89,7 +88,7 @@ def _entry(path: Path) -> BagEntry:
 
 def _summary(files: Sequence[Path]) -> McapSummary | None:
     """What the summaries of all files say together; None where one has none."""
-    told = [None if is_sqlite3(file) else read_summary(file) for file in files]
+    told = [read_summary(file) for file in files]
     found = [each for each in told if each is not None]
     if len(found) < len(files):
         return None

@@ -4,6 +4,7 @@ It is written in version 9 (ROS 2 Jazzy), with every key that it has.
 """
 
 import os
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,21 +22,28 @@ from endoscope_core.schema import load_yaml
 METADATA = 'metadata.yaml'
 ROS_DISTRO = 'jazzy'
 VERSION = 9
+SQLITE3 = '.db3'
+"""End of the name of a file in the storage that older versions of rosbag2 wrote."""
 _ROOT = 'rosbag2_bagfile_information'
 
 
 def bag_files(path: Path) -> list[Path]:
-    """Return the ``.mcap`` or ``.db3`` files, in order, of a recording that is one or a folder."""
+    """Return the ``.mcap`` files, in order, of a recording that is one or a folder."""
     if not path.exists():
         raise BagNotFoundError(f'{path}: no such file or folder')
     if path.is_file():
+        if path.suffix == SQLITE3:
+            raise _in_sqlite3(path)
         return [path]
     # The recorder of a folder without metadata was killed.
     if not (path / METADATA).is_file():
-        found = sorted(path.glob('*.mcap')) or sorted(path.glob('*.db3'))
+        found = sorted(path.glob('*.mcap'))
         if not found:
-            raise BagError(
-                f'{path}: a folder with neither metadata.yaml nor any .mcap or .db3 in it'
+            old = sorted(path.glob(f'*{SQLITE3}'))
+            raise (
+                _in_sqlite3(old[0])
+                if old
+                else BagError(f'{path}: a folder with neither metadata.yaml nor any .mcap in it')
             )
         return found
     files = [path / name for name in _listed_files(path / METADATA)]
@@ -58,11 +66,13 @@ def _listed_files(path: Path) -> list[str]:
         raise BagError(f'{path}: not the metadata of a rosbag2 recording')
     storage = information.get('storage_identifier')
     compression = information.get('compression_mode') or 'none'
-    if storage not in ('mcap', 'sqlite3') or str(compression).lower() != 'none':
+    if storage == 'sqlite3':
+        raise _in_sqlite3(path.parent)
+    if storage != 'mcap' or str(compression).lower() != 'none':
         raise BagError(
-            f'{path}: storage {storage}, compression mode {compression}: only mcap and sqlite3 '
-            'without compression of whole files or messages are read; convert it where it was '
-            'recorded (ros2 bag convert)'
+            f'{path}: storage {storage}, compression mode {compression}: only mcap without '
+            'compression of whole files or messages is read; convert it where it was recorded '
+            '(ros2 bag convert)'
         )
     if not isinstance(listed, list) or not all(isinstance(name, str) for name in listed):
         raise BagError(f'{path}: relative_file_paths is {listed!r}: it has to list names of files')
@@ -70,6 +80,15 @@ def _listed_files(path: Path) -> list[str]:
     if len(set(names)) < len(names):
         raise BagError(f'{path}: relative_file_paths lists a file twice')
     return names
+
+
+def _in_sqlite3(path: Path) -> BagError:
+    source = shlex.quote(str(path))
+    return BagError(
+        f'{path}: a recording in sqlite3 storage; make an MCAP of it first: '
+        f'rosbags-convert --src {source} --dst {source.removesuffix(SQLITE3)}_mcap '
+        '--dst-storage mcap'
+    )
 
 
 @dataclass(frozen=True)

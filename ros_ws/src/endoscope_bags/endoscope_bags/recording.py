@@ -25,14 +25,12 @@ from endoscope_bags.joint_state_series import (
 from endoscope_bags.mcap_scan import McapScan, scan_mcap
 from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED, typestore
 from endoscope_bags.metadata import bag_files
-from endoscope_bags.sqlite3_scan import Sqlite3Scan, is_sqlite3, scan_sqlite3
 from endoscope_bags.topic import MessageTimes, QosProfile, RawMessage, Topic, qos_from_yaml
 from endoscope_core.errors import FileError
 from endoscope_core.rig import Rig, rig_as_text, rig_from_text, shipped_rig
 from endoscope_core.schema import LARGEST
 
 IntArray = npt.NDArray[np.int64]
-Scan = McapScan | Sqlite3Scan
 _NAME, _KEY = 'endoscope_rig', 'rig.yaml'
 """Of the metadata record, which stands before all messages."""
 EVENT_RECORD = 'endoscope_event'
@@ -62,7 +60,7 @@ class _Block(NamedTuple):
     sequence: IntArray
 
 
-def _rows_of_topics(scan: Scan) -> dict[str, IntArray]:
+def _rows_of_topics(scan: McapScan) -> dict[str, IntArray]:
     """For each topic of a file the rows of its messages in the file's table."""
     names = list(dict.fromkeys(channel.topic for channel in scan.channels.values()))
     numbers = {name: k for k, name in enumerate(names)}
@@ -92,7 +90,7 @@ class Recording:
         What is wrong, one line each; empty unless it was opened with `salvage`.
     """
 
-    def __init__(self, path: Path, scans: Sequence[Scan], salvage: bool = False) -> None:
+    def __init__(self, path: Path, scans: Sequence[McapScan], salvage: bool = False) -> None:
         self.path = path
         self._salvage = salvage
         self.library = scans[0].header.library
@@ -106,7 +104,7 @@ class Recording:
         for scan in scans:
             self._add(scan)
 
-    def _add(self, scan: Scan) -> None:
+    def _add(self, scan: McapScan) -> None:
         rows = _rows_of_topics(scan)
         uncounted = dict(rows)
         self._rows.append(rows)
@@ -394,12 +392,12 @@ class Recording:
 
 
 def open_bag(path: str | Path, *, salvage: bool = False) -> Recording:
-    """Open a rosbag2 folder, or a bare ``.mcap`` or ``.db3`` file.
+    """Open a rosbag2 folder, or a bare ``.mcap`` file.
 
     Parameters
     ----------
     path
-        Folder with ``metadata.yaml`` and one or more ``.mcap`` or ``.db3``, or one such file.
+        Folder with ``metadata.yaml`` and one or more ``.mcap``, or one such file.
     salvage
         Read what is sound of a damaged recording (see `Recording.damage`) instead of raising.
 
@@ -411,10 +409,7 @@ def open_bag(path: str | Path, *, salvage: bool = False) -> Recording:
         do.
     """
     path = Path(path)
-    scans: list[Scan] = [
-        (scan_sqlite3 if is_sqlite3(file) else scan_mcap)(file, salvage=salvage)
-        for file in bag_files(path)
-    ]
+    scans = [scan_mcap(file, salvage=salvage) for file in bag_files(path)]
     for scan in scans:
         foreign = {c.message_encoding for c in scan.channels.values()} - {'cdr'}
         if foreign:

@@ -1,11 +1,18 @@
 """Reading: any namespace, order, rate and joints; each flaw one clear error."""
 
 import contextlib
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Sqlite3Writer
 
 from endoscope_bags import BagError, BagWriter, open_bag
 from endoscope_bags.cdr_encoding import (
@@ -19,6 +26,7 @@ from endoscope_bags.errors import (
     CorruptBagError,
     MalformedMessageError,
 )
+from endoscope_bags.listing import bags_in
 from endoscope_bags.message_types import (
     DIAGNOSTIC_ARRAY,
     JOINT_STATE,
@@ -259,6 +267,26 @@ def test_other_storages_and_missing_files_are_named(tmp_path):
     (folder / 'bag_0.mcap').unlink()
     with pytest.raises(BagNotFoundError, match=r'bag_0\.mcap: missing, though'):
         open_bag(folder)
+
+
+def test_a_recording_in_sqlite3_storage_is_told_how_to_become_an_mcap(tmp_path):
+    old = tmp_path / 'my old'
+    with Sqlite3Writer(old, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        topic = writer.add_connection('/rig/a', JOINT_STATE, typestore=typestore())
+        for k in range(9):
+            writer.write(topic, k, encode_joint_state(['bend_x'], k, position=[k]))
+    for path in (old, old / 'my old.db3'):
+        with pytest.raises(BagError, match='sqlite3 storage') as caught:
+            open_bag(path)
+        [command] = re.findall('rosbags-convert .*', str(caught.value))
+        program, *words = shlex.split(command)
+        subprocess.run([Path(sys.executable).with_name(program), *words], check=True)
+        assert open_bag(words[words.index('--dst') + 1]).joint_state('a').position[8, 0] == 8
+    [entry] = [entry for entry in bags_in(tmp_path) if entry.name == 'my old']
+    assert 'rosbags-convert' in entry.trouble
+    (old / 'metadata.yaml').unlink()
+    with pytest.raises(BagError, match=r'old\.db3: .* rosbags-convert'):
+        open_bag(old)
 
 
 def test_every_cut_is_noticed(tmp_path):

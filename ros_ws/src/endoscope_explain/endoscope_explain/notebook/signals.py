@@ -205,7 +205,7 @@ def read(bag: str | Path, *, namespace: str | None = None) -> Signals:
     Parameters
     ----------
     bag : str or Path
-        rosbag2 folder, `.mcap` or `.db3`.
+        rosbag2 folder or `.mcap`.
     namespace : str, optional
         Of the rig's topics, where a bag has several rigs.
 

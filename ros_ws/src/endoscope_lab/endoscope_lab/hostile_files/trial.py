@@ -24,7 +24,6 @@ from endoscope_core.errors import EndoscopeError, printable
 from endoscope_core.workers import worker_pool
 from endoscope_lab.bench import require_known, table_head, table_row
 from endoscope_lab.hostile_files.mcap_case import McapCase
-from endoscope_lab.hostile_files.sqlite3_case import Sqlite3Case
 from endoscope_lab.hostile_files.text_case import (
     cells_case,
     command_case,
@@ -80,7 +79,6 @@ KINDS: dict[str, Callable[[Path], 'HostileCase']] = {
     'command CSV': command_case,
     'weights': _weights_case,
     'text table': table_case,
-    'db3': Sqlite3Case,
 }
 _BATCH = 50
 
