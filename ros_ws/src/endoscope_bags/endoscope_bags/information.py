@@ -19,7 +19,7 @@ from endoscope_core.rig import RigKind
 LOST_PREFIX = 'lost '
 _NUMBER = re.compile('[0-9]{1,18}')
 # A topic is silent if nothing comes for so many periods; one slower than this is not periodic.
-_SILENT_PERIODS = 2.5
+SILENT_PERIODS = 2.5
 _SLOWEST_PERIOD_S = 0.2
 _FEWEST_MESSAGES = 10
 # Several sources that report once a second give a median interval that is nobody's period.
@@ -185,7 +185,7 @@ def _topic_information(
     order = np.argsort(stamps, kind='stable')
     intervals = np.diff(stamps[order]) * 1e-9
     period = _period(intervals)
-    silent = intervals > _SILENT_PERIODS * period if period else np.zeros(len(intervals), bool)
+    silent = intervals > SILENT_PERIODS * period if period else np.zeros(len(intervals), bool)
     latched = any(profile.durability == 'transient_local' for profile in topic.qos)
     paused = silent & ((lost_before[order][1:] == 0) if numbered else latched)
     duration = float(intervals.sum())

@@ -40,39 +40,6 @@ UNITS = {
 }
 """SI value of one of each unit."""
 TIME_UNITS = ('s', 'ms', 'us', 'ns', DATE)
-UNIT_SPELLINGS = {
-    **{unit: unit for unit in UNITS if unit not in ('-', DATE)},
-    'sec': 's',
-    'second': 's',
-    'seconds': 's',
-    'msec': 'ms',
-    'millis': 'ms',
-    'milliseconds': 'ms',
-    'µs': 'us',
-    'usec': 'us',
-    'micros': 'us',
-    'microseconds': 'us',
-    'nsec': 'ns',
-    'nanos': 'ns',
-    'nanoseconds': 'ns',
-    'radian': 'rad',
-    'radians': 'rad',
-    '°': 'deg',
-    'degree': 'deg',
-    'degrees': 'deg',
-    'turns': 'turn',
-    'rev': 'turn',
-    '1/min': 'rpm',
-    '°/s': 'deg/s',
-    'dps': 'deg/s',
-    'newton': 'N',
-    'newtons': 'N',
-    'Nm': 'N m',
-    'N·m': 'N m',
-    'N*m': 'N m',
-    'mNm': 'mN m',
-}
-"""By spelling; what is not found as it is written is looked for in lower case."""
 QUANTITIES = ('position', 'velocity', 'effort')
 ANGLES = ('bend_x', 'bend_y', 'motor_x', 'motor_y')
 NAMES = {
@@ -94,13 +61,13 @@ topics:                                 # what each topic takes from the table
   motor/measured_js:
     position: {motor_x: {column: 3, unit: rad, scale: 0.5, offset: 0.1}}
   slave/measured_js:
-    position: {bend_x: {column: angle}}          # no unit: the one in the table's heading, else SI
+    position: {bend_x: {column: angle}}          # no unit: SI
   wires/measured_js:
     effort: {wire_x_pos: {column: 5, unit: N}, wire_x_neg: {column: 6, unit: N}}
 # All that follows may be left out.
-delimiter: ';'          # one character, or whitespace; found from the table if left out
-decimal_comma: true     # numbers such as 0,25; found if left out
-header_lines: 2         # lines above the numbers; found if left out
+delimiter: ';'          # one character, or whitespace; looked for if left out
+decimal_comma: true     # numbers such as 0,25
+header_lines: 2         # lines above the numbers, of which the last names the columns
 namespace: /endoscope   # of the topics
 start_s: 0.0            # added to every time
 drop_repeats: true      # drop rows whose time is that of the row before
@@ -115,7 +82,8 @@ A mapping file says what the columns are:
 {EXAMPLE}
 sample_and_hold: true   # in place of drop_repeats, for a table that was written faster than its
                         # sources gave new numbers: a topic has a message where one of its
-                        # columns changes, at a time between that of the row and the next
+                        # columns changes, at a time between that of the row and the next,
+                        and where its source rests at the interval that it had
 Topics hold position, velocity or effort. Units of time are {', '.join(TIME_UNITS)}
 (date: ISO 8601, such as 2026-01-31 13:45:00.250, or a time of day), other units
 {', '.join(unit for unit in UNITS if unit not in TIME_UNITS)}.
@@ -125,17 +93,6 @@ _DELIMITER = Meta(
     pattern=rf'(?s)^(?:.|{WHITESPACE})\Z', description=f'one character, or {WHITESPACE}'
 )
 _VALUE_UNIT = one_of(unit for unit in UNITS if unit not in TIME_UNITS)
-
-
-def known_unit(text: str) -> str | None:
-    """Return a unit as `UNITS` has it, however it is spelled; None for what is none."""
-    text = text.strip().replace('μ', 'µ')
-    return UNIT_SPELLINGS.get(text) or UNIT_SPELLINGS.get(text.casefold())
-
-
-def _as_unit(value: Any) -> Any:
-    spelt = isinstance(value, str) and value not in UNITS
-    return (known_unit(value) or value) if spelt else value
 
 
 def _without_slash(value: Any) -> Any:
@@ -150,8 +107,7 @@ class Column:
         Annotated[int, Meta(ge=1)] | Annotated[str, Meta(pattern=r'\S')],
         Meta(description='the number of a column, from 1, or its name'),
     ]
-    # None for that of the table's heading.
-    unit: Annotated[str, Before(_as_unit), _VALUE_UNIT] | None = None
+    unit: Annotated[str, _VALUE_UNIT] = '-'  # already SI
     scale: float = 1.0
     offset: float = 0.0
 
@@ -160,18 +116,18 @@ class Column:
 class TimeColumn(Column):
     """The column of times."""
 
-    unit: Annotated[str, Before(_as_unit), one_of(TIME_UNITS)] | None = None
+    unit: Annotated[str, one_of(TIME_UNITS)] = 's'
 
 
 @dataclass(frozen=True)
 class TableMapping:
-    """A whole mapping file; what is None is to be found from the table."""
+    """A whole mapping file."""
 
     time: TimeColumn
     # Columns by topic, quantity and name.
     topics: Mapping[str, Mapping[Literal[QUANTITIES], Mapping[str, Column]]]  # type: ignore[valid-type]
     delimiter: Annotated[str, _DELIMITER] | None = None
-    decimal_comma: bool | None = None
+    decimal_comma: bool = False
     header_lines: Annotated[int, within(0)] | None = None
     namespace: Annotated[str, Before(_without_slash)] = '/endoscope'
     start_s: float = 0.0

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from endoscope_bags.bag_writer import BagWriter, MessageStream
 from endoscope_bags.cdr_encoding import encode_joint_states
-from endoscope_bags.delimited_text import DelimitedText, is_date, is_number, read_table
+from endoscope_bags.delimited_text import DelimitedText, read_table
 from endoscope_bags.errors import BagError
+from endoscope_bags.information import SILENT_PERIODS
 from endoscope_bags.message_types import JOINT_STATE
-from endoscope_bags.table_mapping import DATE, TIME_UNITS, UNITS, Column, TableMapping
+from endoscope_bags.table_mapping import DATE, UNITS, Column, TableMapping
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
@@ -30,14 +31,26 @@ class Converted:
     """What was converted."""
 
     rows: int
-    # Rows that were dropped because their time is that of the row before or, where the table
-    # samples and holds, because no topic has a new number in them.
-    repeated: int
     messages: int
+    repeated: int = 0  # rows that were dropped because their time is that of the row before
+    # Rows without a message, where the table samples and holds: nothing in them is new.
+    held: int = 0
     # Rows by topic that were dropped because a part of its cells is empty or not finite.
     incomplete: dict[str, int] = field(default_factory=dict)
     # Cells that are empty or not finite, by the name of the column.
     gaps: dict[str, int] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        dropped = [f'{self.repeated} with the time of the row before'] if self.repeated else []
+        dropped += [f'{self.held} that repeat what their sources gave before'] if self.held else []
+        dropped += [
+            f'{rows} of {topic} for a cell without a number'
+            for topic, rows in self.incomplete.items()
+        ]
+        text = f'{self.messages} messages of {self.rows} rows'
+        text += f'; dropped rows: {", ".join(dropped)}' if dropped else ''
+        empty = [f'{cells} of {column}' for column, cells in self.gaps.items()]
+        return text + (f'; cells that are empty or not finite: {", ".join(empty)}' if empty else '')
 
 
 def convert_table(
@@ -73,7 +86,7 @@ def convert_table(
         )
         fresh &= kept
         if mapping.sample_and_hold:
-            fresh[1:] &= np.any([np.diff(v, axis=0).any(axis=1) for v in values.values()], axis=0)
+            fresh &= _sampled(np.concatenate(list(values.values()), axis=1))
         used |= fresh
         streams.append((topic, list(next(iter(quantities.values()))), values, fresh))
     del text
@@ -83,7 +96,9 @@ def convert_table(
             block = slice(first, first + _ROWS_AT_ONCE)
             bag.write_streams([_stream(mapping, time, block, *each) for each in streams])
         messages = bag.message_count
-    return Converted(rows, rows - int(used.sum()), messages, incomplete, gaps)
+    unused = rows - int(used.sum())
+    held = unused if mapping.sample_and_hold else 0
+    return Converted(rows, messages, unused - held, held, incomplete, gaps)
 
 
 def _stream(
@@ -114,18 +129,10 @@ def _stream(
 
 def _times(text: DelimitedText, column: Column, start_s: float) -> Stamps:
     index = text.column(column.column)
-    cells = text.cells(index)
-    unit = column.unit or text.headings[index].unit if index < len(text.headings) else column.unit
-    if unit is None:
-        unit = DATE if is_date(cells[0]) and not is_number(cells[0], text.decimal_comma) else 's'
-    if unit not in TIME_UNITS:
-        raise BagError(
-            f'{text.path}: {text.label(index)} is in {unit}, which is not a unit of time'
-        )
     start = round(start_s * 1e9)
-    if unit == DATE:
+    if column.unit == DATE:
         return text.dates(index) + start
-    in_ns = Decimal(repr(UNITS[unit])) * 10**9
+    in_ns = Decimal(repr(UNITS[column.unit])) * 10**9
     offset = round(Decimal(repr(column.offset)) * in_ns) + start
     if abs(offset) >= _LATEST:
         raise BagError(f'{text.path}: offset or start_s: no stamp reaches it')
@@ -177,12 +184,27 @@ def _values(
 
 
 def _si(text: DelimitedText, column: Column) -> tuple[Array, Mask]:
-    index = text.column(column.column)
-    numbers, empty = text.numbers(index)
-    unit = column.unit or text.headings[index].unit or '-'
+    numbers, empty = text.numbers(text.column(column.column))
     # What goes beyond all numbers is found by its not being finite.
     with np.errstate(over='ignore', invalid='ignore'):
-        return UNITS[unit] * (numbers * column.scale + column.offset), empty
+        return UNITS[column.unit] * (numbers * column.scale + column.offset), empty
+
+
+def _sampled(values: Array) -> Mask:
+    """Rows (N,) of values (N, K) in which their source has sampled.
+
+    That is where a number changes. A source that rests gives the same number again: where none
+    changes for what `bag info` calls a silence, a sample is taken at the usual interval of changes.
+    """
+    changed = np.r_[True, np.diff(values, axis=0).any(axis=1)]
+    first = np.flatnonzero(changed)
+    steps = np.diff(np.r_[first, len(values)])
+    # The last rest may go on behind the table.
+    usual = max(1, round(float(np.median(steps[:-1])))) if len(steps) > 1 else 1
+    since = np.arange(len(values)) - np.repeat(first, steps)
+    rests = np.repeat(steps > SILENT_PERIODS * usual, steps)
+    sampled: Mask = changed | (rests & (since % usual == 0))
+    return sampled
 
 
 def _between_times(table: Path, time: Stamps) -> Stamps:

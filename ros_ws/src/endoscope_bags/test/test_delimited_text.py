@@ -1,6 +1,8 @@
 """Tables as loggers and spreadsheets write them."""
 
 import re
+import shlex
+import subprocess
 from dataclasses import fields
 
 import numpy as np
@@ -9,9 +11,10 @@ import pytest
 from endoscope_bags import open_bag
 from endoscope_bags.delimited_text import date_ns, read_table
 from endoscope_bags.errors import BagError
-from endoscope_bags.mapping_proposal import propose_mapping
+from endoscope_bags.mapping_skeleton import described_table
 from endoscope_bags.table_mapping import EXAMPLE, TableMapping, load_table_mapping
 from endoscope_bags.text_table import convert_table
+from endoscope_core.errors import FileError
 
 ROWS = [(0.0, 10.0, -1.5), (0.01, 11.0, -1.25), (0.02, 12.0, -1.0), (0.03, 13.5, 0.5)]
 
@@ -34,62 +37,48 @@ def mapped(tmp_path, text, mapping):
     return done, open_bag(tmp_path / 'bag')
 
 
-@pytest.mark.parametrize('newline', ['\n', '\r\n', '\r'])
-@pytest.mark.parametrize('encoding', ['utf-8', 'utf-8-sig', 'utf-16'])
+@pytest.mark.parametrize(
+    ('newline', 'encoding'), [('\n', 'utf-8'), ('\r\n', 'utf-8-sig'), ('\r', 'utf-16')]
+)
 @pytest.mark.parametrize(
     ('separator', 'comma'),
     [(',', False), (';', False), (';', True), ('\t', False), ('\t', True), ('  ', False)],
 )
 @pytest.mark.parametrize(
-    'above',
+    ('above', 'header_lines'),
     [
-        [],
-        ['time|angle|force'],
-        ['# time|angle|force'],
-        ['% rig 4, tube 2', '%', '% time|angle|force'],
-        ['Rig 4', 'sampling rate|1000', '', 'time|angle|force'],
-        ['time|angle|force', 's|deg|N'],
+        ([], None),
+        (['time|angle|force'], None),
+        (['# time|angle|force'], None),
+        (['% rig 4, tube 2', '%', '% time|angle|force'], 3),
+        (['Rig 4', 'sampling rate|1000', '', 'time|angle|force'], 4),
     ],
 )
-def test_separator_decimal_sign_and_headings_are_found(
-    tmp_path, separator, comma, above, encoding, newline
+def test_the_separator_and_the_line_of_names_are_found(
+    tmp_path, separator, comma, above, header_lines, encoding, newline
 ):
     head = ''.join(line.replace('|', separator) + '\n' for line in above)
     text = (head + lines(separator, comma) + '\n').replace('\n', newline)
-    read = read_table(table(tmp_path / 't.csv', text, encoding))
+    read = read_table(
+        table(tmp_path / 't.csv', text, encoding), header_lines=header_lines, decimal_comma=comma
+    )
     values = np.stack([read.numbers(k)[0] for k in range(3)], axis=1)
     assert values.tolist() == [list(row) for row in ROWS]
-    assert [heading.name for heading in read.headings] == (
-        ['time', 'angle', 'force'] if above else ['', '', '']
-    )
-    if above[-1:] == ['s|deg|N']:
-        assert [heading.unit for heading in read.headings] == ['s', 'deg', 'N']
+    assert read.titles == (('time', 'angle', 'force') if above else ())
 
 
-@pytest.mark.parametrize(
-    ('title', 'name', 'unit'),
-    [
-        ('angle [deg]', 'angle', 'deg'),
-        ('angle (°)', 'angle', 'deg'),
-        ('time_ms', 'time', 'ms'),
-        ('t [µs]', 't', 'us'),
-        ('force (N)', 'force', 'N'),
-        ('torque[Nm]', 'torque', 'N m'),
-        ('pos (5)', 'pos (5)', None),
-        ('wire_x_pos', 'wire_x_pos', None),
-        ('angle', 'angle', None),
-    ],
-)
-def test_units_are_read_from_headings(tmp_path, title, name, unit):
-    read = read_table(table(tmp_path / 't.csv', f'{title};b\n0;1\n1;2\n'))
-    assert (read.headings[0].name, read.headings[0].unit) == (name, unit)
-    for asked in (title, name, title.upper()):
-        assert read.column(asked) == 0
+def test_an_encoding_that_is_not_read_is_named_with_what_to_do(tmp_path):
+    path = table(tmp_path / 't.csv', 't,q\n0,1\n1,90\xb0\n', 'latin-1')
+    with pytest.raises(BagError, match=r'line 3: byte 0xb0 is not utf-8; .*Latin-1') as caught:
+        read_table(path)
+    [command] = re.findall('iconv .*', str(caught.value))
+    subprocess.run(shlex.split(command), cwd=tmp_path, check=True)
+    assert read_table(tmp_path / 'utf8.csv').cells(1) == ['1', '90\xb0']
 
 
 def test_quoted_cells_may_hold_the_separator(tmp_path):
     read = read_table(table(tmp_path / 't.csv', '"time, s","angle"\n"0","1"\n"1","2"\n'))
-    assert [heading.title for heading in read.headings] == ['time, s', 'angle']
+    assert read.titles == ('time, s', 'angle')
     assert read.numbers(1)[0].tolist() == [1.0, 2.0]
 
 
@@ -119,21 +108,6 @@ def test_times_of_all_kinds_are_exact(tmp_path, time, unit, first, step):
     assert bag.joint_state('a/b').stamp_ns.tolist() == [first, first + step]
 
 
-def test_a_heading_gives_the_unit_that_a_mapping_leaves_out(tmp_path):
-    text = 'time_ms;angle [deg];force (mN)\n' + lines(';', rows=[(0, 90, 1), (10, 180, 2)])
-    mapping = """
-time: {column: time}
-topics:
-  slave/measured_js: {position: {bend_x: {column: angle, scale: 0.5, offset: 1.0}}}
-  wires/measured_js: {effort: {wire_x_pos: {column: 3}}}
-"""
-    _, bag = mapped(tmp_path, text, mapping)
-    angle = bag.joint_state('slave/measured_js')
-    assert angle.stamp_ns.tolist() == [0, 10_000_000]
-    assert np.degrees(angle.position[:, 0]) == pytest.approx([46.0, 91.0])
-    assert bag.joint_state('wires/measured_js').effort[:, 0] == pytest.approx([1e-3, 2e-3])
-
-
 def test_an_empty_cell_is_no_sample(tmp_path):
     """As loggers write what is slower than their fastest source."""
     text = 't,q,f\n0,1,5\n1,,6\n2,3,7\n'
@@ -151,13 +125,16 @@ topics: {a/q: {position: {q: {column: q}}}, a/f: {effort: {f: {column: f}}}}
     ('text', 'error', 'message'),
     [
         ('t,q\n0,1\n1,x\n', BagError, "line 3, column 2 (q): 'x' is not a number"),
-        ('# a\nt,q\n0,1\n\n1\n', BagError, 'line 5 has 1 columns, 2 are needed'),
+        ('t,q\n' + '0,1\n' * 20 + '\n1\n', BagError, 'line 23 has 1 columns, 2 are needed'),
+        ('t\n0\n1\n', BagError, 'no separator (semicolon, tab, comma, blanks) cuts'),
         ('t,q\n0,1\nsoon,2\n', BagError, "line 3, column 1 (t): 'soon' is not a number"),
         ('t,q\n0,1\nnan,2\n', BagError, "line 3, column 1 (t): the time 'nan' is not finite"),
         ('t,q\n0,1\n1e30,2\n', BagError, 'no stamp reaches it'),
         ('t,q\n0,1\n1,inf\n', BagError, 'line 3: position of a/b is not finite'),
         ('t,angle\n0,1\n1,2\n', BagError, "no column is named 'q': "),
         ('t,q,q\n0,1,1\n1,2,2\n', BagError, "2 columns are named 'q': give the number"),
+        ('t;q\n0;1\n1;2,5\n', BagError, "'2,5' is not a number: decimal_comma: true"),
+        ('t,q\n2026-01-31 13:45:00,1\n', BagError, 'fewer than two rows'),
         ('0,1\n1,2\n', BagError, 'the table names no columns: give the number'),
         ('t,q\n', BagError, 'fewer than two rows'),
         ('t,q\n-1,1\n0,2\n', BagError, 'set start_s'),
@@ -192,47 +169,27 @@ def test_the_example_in_the_help_is_valid_and_complete(tmp_path):
     assert all(f'{key}:' in EXAMPLE for key in keys)
 
 
-def test_columns_are_proposed_by_name_range_and_step(tmp_path):
-    text = (
-        'counter,timestamp,target [deg],motor position,force left (N),force right (N),'
-        'measured angle,note\n'
-    )
-    text += '\n'.join(
-        f'{k},{1000 + 5 * k},{40 * np.sin(k / 9):.3f},{0.3 * np.sin(k / 9):.4f},'
-        f'{5 + np.sin(k / 9):.3f},{5 - np.sin(k / 9):.3f},{30 * np.sin(k / 9 - 0.3):.3f},fine'
-        for k in range(100)
-    )
-    proposal = propose_mapping(read_table(table(tmp_path / 't.csv', text)))
-    assert {(c.title, c.role, c.unit) for c in proposal.columns if c.role} == {
-        ('timestamp', 'time', 'ms'),
-        ('target [deg]', 'slave/servo_jp position bend_x', 'deg'),
-        ('motor position', 'motor/measured_js position motor_x', 'rad'),
-        ('force left (N)', 'wires/measured_js effort wire_x_pos', 'N'),
-        ('force right (N)', 'wires/measured_js effort wire_x_neg', 'N'),
-        ('measured angle', 'slave/measured_js position bend_x', 'deg'),
-    }
-    assert '#   column 8 note' in proposal.mapping()
-
-
-def test_a_proposal_converts_as_it_is(tmp_path):
+def test_a_proposal_is_a_mapping_to_fill_in(tmp_path):
     text = 'time_ms;target [deg];angle [deg]\n' + lines(';', comma=True)
-    source = table(tmp_path / 't.csv', text)
-    (tmp_path / 'm.yaml').write_text(propose_mapping(read_table(source)).mapping())
+    description = described_table(read_table(table(tmp_path / 't.csv', text)))
+    assert [(c.title, c.low, c.high) for c in description.columns] == [
+        ('time_ms', None, None),
+        ('target [deg]', None, None),
+        ('angle [deg]', None, None),
+    ]
+    source = table(tmp_path / 't.csv', text.replace(',', '.'))
+    description = described_table(read_table(source))
+    assert [(c.low, c.high) for c in description.columns] == [(0, 0.03), (10, 13.5), (-1.5, 0.5)]
+    proposed = description.mapping()
+    (tmp_path / 'm.yaml').write_text(proposed)
+    with pytest.raises(FileError, match='column'):
+        load_table_mapping(tmp_path / 'm.yaml')
+    time, rest = '{column: , unit: s}', proposed.index('  motor/servo_jp:')
+    filled = proposed[:rest].replace(time, '{column: time_ms, unit: ms}')
+    (tmp_path / 'm.yaml').write_text(filled.replace('{column: ,', '{column: "target [deg]",'))
     convert_table(source, load_table_mapping(tmp_path / 'm.yaml'), tmp_path / 'bag')
     command = open_bag(tmp_path / 'bag').joint_state('slave/servo_jp')
     assert np.degrees(command.position[:, 0]) == pytest.approx([10.0, 11.0, 12.0, 13.5])
-
-
-@pytest.mark.parametrize(('first', 'unit'), [(0, 'ms'), (1_700_000_000_000_000_000, 'ns')])
-def test_nameless_columns_are_told_and_only_the_time_is_taken(tmp_path, first, unit):
-    text = '\n'.join(f'{first + 25 * k} {np.sin(k):.3f} {np.cos(k):.3f}' for k in range(50))
-    proposal = propose_mapping(read_table(table(tmp_path / 't.txt', text)))
-    assert [(c.role, c.unit) for c in proposal.columns] == [
-        ('time', unit),
-        (None, None),
-        (None, None),
-    ]
-    assert '# topics:' in proposal.mapping()
 
 
 def test_a_date_before_the_epoch_and_one_without_a_zone():

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from endoscope_bags import BagError, open_bag
+from endoscope_bags.information import bag_information
 from endoscope_bags.table_mapping import load_table_mapping
 from endoscope_bags.text_table import convert_table
 from endoscope_core.errors import FileError
@@ -85,7 +86,31 @@ def test_a_table_written_faster_than_its_sources_gives_each_number_its_own_time(
     assert bending.position[:, 0] == pytest.approx(np.radians(np.arange(6)), abs=1e-6)
     fresh = np.sort(np.r_[stamps, stamps + 0.0125, stamps + 0.01875])
     assert wires.stamp_ns * 1e-9 == pytest.approx(fresh, abs=1e-6)
-    assert (done.rows, done.repeated, done.messages) == (40, 5, 10 + 6 + 30)
+    assert (done.rows, done.held, done.messages) == (40, 5, 10 + 6 + 30)
+    assert (
+        str(done)
+        == '46 messages of 40 rows; dropped rows: 5 that repeat what their sources gave before'
+    )
+
+
+def test_a_source_that_rests_has_samples_all_the_same(tmp_path):
+    """A table at 1 kHz of an encoder read at 100 Hz, which rests for a second."""
+    angle = np.repeat(np.r_[np.arange(100), np.full(100, 99), np.arange(99, 0, -1)], 10)
+    rows = [f'{k * 1e-3:.3f}, {k}, {q}, 5, 5' for k, q in enumerate(angle)]
+    (tmp_path / 'table.txt').write_text('\n'.join(rows))
+    path = tmp_path / 'mapping.yaml'
+    path.write_text(MAPPING + 'sample_and_hold: true\n')
+    convert_table(tmp_path / 'table.txt', load_table_mapping(path), tmp_path / 'bag')
+    [measured] = [
+        t
+        for t in bag_information(open_bag(tmp_path / 'bag')).topics
+        if t.name.endswith('slave/measured_js')
+    ]
+    assert (measured.rate_hz, measured.gaps, measured.message_count) == (
+        pytest.approx(100.0),
+        0,
+        299,
+    )
 
 
 def test_what_samples_and_holds_needs_more_than_one_time(tmp_path):
@@ -134,7 +159,7 @@ def test_a_wrong_mapping_is_refused_by_its_key(tmp_path, old, new, message):
 @pytest.mark.parametrize(
     ('text', 'error', 'message'),
     [
-        ('0,1,1,5,5\n1,1,1,5\n', BagError, 'line 2 has 4 columns, 5 are needed'),
+        ('0,1,1,5,5\n' * 20 + '1,1,1,5\n', BagError, 'line 21 has 4 columns, 5 are needed'),
         ('0,1,1,5,5\n1,one,1,5,5\n', BagError, "line 2, column 2: 'one' is not a number"),
         ('0,1,1,5,5\n', BagError, 'fewer than two rows'),
         ('1,1,1,5,5\n0,1,1,5,5\n', BagError, 'line 2: time runs backwards, from 101 to 100 s'),
@@ -160,6 +185,8 @@ def test_incomplete_rows_are_counted_and_dropped_where_the_mapping_says_so(tmp_p
     table.write_text('t,u,q,a,b\n0,1,nan,5,5\n1,1,1,5,\n2,1,1,,\n3,1,1,5,5\n')
     done = convert_table(table, load_table_mapping(path), tmp_path / 'bag')
     assert done.incomplete == {'slave/measured_js': 1, 'wires/measured_js': 1}
+    assert '1 of wires/measured_js for a cell without a number' in str(done)
+    assert '2 of column 5 (b)' in str(done)
     assert done.gaps == {'column 3 (q)': 1, 'column 4 (a)': 1, 'column 5 (b)': 2}
     bag = open_bag(tmp_path / 'bag')
     stamps = {topic: bag.joint_state(topic).stamp_ns * 1e-9 - 100.0 for topic in bag.topics}

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from endoscope_bringup.subcommands import add_json_option, print_json
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import EndoscopeError, printable
 
 
 class _MappingHelp(argparse.Action):
@@ -23,10 +23,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         help='turn a text table of measurements into a bag',
         description='Writes the columns of TABLE, described by a mapping file, as topics of a '
-        'bag. Without\na mapping it says what the columns seem to be; nothing is converted by a '
-        'guess:\n\n'
+        'bag. Without\na mapping it says what is in the table:\n\n'
         '    endoscope convert run.csv                              what is in the table\n'
-        '    endoscope convert run.csv --propose mapping.yaml       a mapping to be checked\n'
+        '    endoscope convert run.csv --propose mapping.yaml       a mapping to fill in\n'
         '    endoscope convert run.csv --mapping mapping.yaml --out run',
     )
     # The keys of a mapping are read from where they are, and only when somebody asks.
@@ -41,7 +40,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         help='which column is which topic, quantity, joint and unit',
     )
     parser.add_argument(
-        '--propose', type=Path, metavar='M.yaml', help='write a mapping to be checked; new file'
+        '--propose', type=Path, metavar='M.yaml', help='write a mapping to fill in; new file'
     )
     parser.add_argument(
         '--out',
@@ -70,20 +69,13 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print_json({'bag': args.out, **vars(done)})
         return 0
-    print(
-        f'{args.out}: {done.messages} messages of {done.rows} rows, '
-        f'{done.repeated} repeated rows dropped'
-    )
-    for column, cells in done.gaps.items():
-        print(f'    {column}: {cells} cells are empty or no finite number')
-    for topic, rows in done.incomplete.items():
-        print(f'    {topic}: {rows} incomplete rows dropped')
+    print(f'{args.out}: {printable(str(done))}')
     return 0
 
 
 def _propose(args: argparse.Namespace) -> int:
     from endoscope_bags.delimited_text import read_table
-    from endoscope_bags.mapping_proposal import propose_mapping
+    from endoscope_bags.mapping_skeleton import described_table
     from endoscope_core.atomic_output import write_text
 
     if args.out is not None:
@@ -91,15 +83,15 @@ def _propose(args: argparse.Namespace) -> int:
             f'{args.out} is not written: say what the columns of {args.table} are with --mapping; '
             '--propose M.yaml writes one to begin with'
         )
-    proposal = propose_mapping(read_table(args.table))
+    description = described_table(read_table(args.table))
     if args.propose is not None:
-        write_text(args.propose, proposal.mapping(), overwrite=False)
+        write_text(args.propose, description.mapping(), overwrite=False)
     if args.json:
-        print_json({**proposal.as_json(), 'mapping': proposal.mapping()})
+        print_json({**description.as_json(), 'mapping': description.mapping()})
         return 0
-    print(proposal)
+    print(description)
     if args.propose is None:
-        print('Nothing is written: --propose M.yaml writes these guesses as a mapping to check.')
+        print('Nothing is written: --propose M.yaml writes a mapping to fill in.')
     else:
-        print(f'{args.propose}: check it, then give it with --mapping {args.propose} --out BAG')
+        print(f'{args.propose}: fill it in, then give it with --mapping {args.propose} --out BAG')
     return 0
