@@ -109,6 +109,11 @@ def print_json(content: object) -> None:
     print(json.dumps(_plain(content), indent=1, ensure_ascii=False, allow_nan=False))
 
 
+def print_json_line(content: object) -> None:
+    """Print the same in one line, of plain ASCII: whatever a stranger wrote steers no terminal."""
+    print(json.dumps(_plain(content), allow_nan=False), flush=True)
+
+
 def _plain(value: object) -> object:
     if isinstance(value, Mapping):
         return {str(key): _plain(each) for key, each in value.items()}
@@ -116,6 +121,8 @@ def _plain(value: object) -> object:
         return [_plain(each) for each in value]
     if value is None or isinstance(value, bool | int):
         return value
+    if hasattr(value, 'tolist'):  # an array
+        return _plain(value.tolist())
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else None
     return str(value)

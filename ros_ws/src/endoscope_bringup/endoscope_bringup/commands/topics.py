@@ -1,4 +1,4 @@
-"""`endoscope topics`: which topics there are, how often they speak, and what they say."""
+"""`endoscope topics`: which topics there are, what is missing, and what they say."""
 
 import argparse
 
@@ -9,19 +9,17 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `topics`."""
     parser = subparsers.add_parser(
         'topics',
-        help="the graph's topics on the wire: who speaks and listens, how often, what they say",
+        help="the graph's topics on the wire: who speaks and listens, what is missing",
         description='Without options lists the topics of the interface with their senders and '
         'readers, and says what is missing. Exits 0, or 1 where nobody sends what was asked for.',
     )
-    what = parser.add_mutually_exclusive_group()
-    what.add_argument(
-        '--hz', metavar='NAME', help='measure how often a topic speaks, by the times of receipt'
+    parser.add_argument(
+        '--echo', metavar='NAME', help='print what a topic says, each message as a line of JSON'
     )
-    what.add_argument('--echo', metavar='NAME', help='print what a topic says')
     parser.add_argument('--once', action='store_true', help='with --echo: only one message')
     parser.add_argument('--count', type=COUNT, metavar='N', help='end after N messages')
     parser.add_argument('--seconds', type=SECONDS, metavar='S', help='end after S seconds')
-    parser.add_argument('--json', action='store_true', help='JSON; one object a line with --echo')
+    parser.add_argument('--json', action='store_true', help='the list as JSON')
     parser.add_argument(
         '--namespace',
         default='endoscope',
@@ -37,20 +35,18 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """List, measure or print; return 1 where nobody sends."""
+    """List or print; return 1 where nobody sends."""
     import sys
 
-    from endoscope_bringup.operating.listening import echo, listing, rate
+    from endoscope_bringup.operating.listening import echo, listing
     from endoscope_nodes.client.graph_client import joined_graph
     from endoscope_nodes.client.graph_listener import GraphError
 
     count = 1 if args.once else args.count
     try:
         with joined_graph('topics', args.namespace) as client:
-            if args.hz:
-                rate(client, args.hz, count, args.seconds, args.timeout, args.json)
-            elif args.echo:
-                echo(client, args.echo, count, args.seconds, args.timeout, args.json)
+            if args.echo:
+                echo(client, args.echo, count, args.seconds, args.timeout)
             else:
                 listing(client, args.timeout, args.json)
     except GraphError as error:

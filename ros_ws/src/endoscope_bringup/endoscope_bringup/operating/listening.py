@@ -1,23 +1,16 @@
-"""Who sends and reads each topic, how often one speaks, and what it says."""
+"""Who sends and reads each topic, what is missing, and what one says."""
 
 import json
 import math
-import statistics
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import fields, is_dataclass
-from itertools import pairwise
+from dataclasses import asdict
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.serialization import deserialize_message
-from sensor_msgs.msg import JointState
-
-from endoscope_bags.message_types import TF_MESSAGE, typestore
+from endoscope_bags.message_types import message_type, typestore
+from endoscope_bringup.subcommands import print_json_line
 from endoscope_core.errors import nearest, printable
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import GraphError
-from endoscope_nodes.names import WIRES
 from endoscope_nodes.runtime.recorded_topics import message_class, suitable_qos
 from endoscope_nodes.topics import BY_NAME, TOPICS, Topic
 
@@ -25,8 +18,6 @@ _HEADINGS = ('topic', 'type', 'senders', 'readers', '')
 _ROS_OWN = ('/parameter_events', '/rosout')
 _FOUND_S = 1.0
 _PROMPT_S = 0.01
-_LEVELS = ('ok', 'WARN', 'ERROR', 'STALE')
-_UNITS = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m'}
 
 
 def listing(client: GraphClient, patience_s: float, as_json: bool) -> None:
@@ -105,37 +96,37 @@ def _senders(client: GraphClient, name: str) -> list[str]:
     return [info.node_name for info in found if info.node_name != own]
 
 
-def _messages(
+def echo(
     client: GraphClient,
     name: str,
     count: int | None,
     seconds: float | None,
     patience_s: float,
-) -> Iterator[tuple[bytes, int, type]]:
-    """Bytes, time of receipt in ns and class of each message; GraphError where none comes."""
+) -> None:
+    """Print messages as they come, each as a line of JSON; GraphError where none comes."""
     full = _full(client, name)
     if not client.wait_until(lambda: bool(_senders(client, full)), patience_s):
         raise GraphError(f'nobody sends {name} in {client.where}{_hint(client, name)}')
-    kind = message_class(dict(client.node.get_topic_names_and_types())[full][0])
+    kind = dict(client.node.get_topic_names_and_types())[full][0]
     publishers = client.node.get_publishers_info_by_topic(full)
-    waiting: list[tuple[bytes, int]] = []
+    waiting: list[bytes] = []
     client.listen(
-        kind,
+        message_class(kind),
         full,
-        lambda data, received_ns: waiting.append((data, received_ns)),
+        lambda data, _: waiting.append(data),
         qos=suitable_qos(False, publishers),
     )
     if not client.wait_until(lambda: bool(waiting), patience_s):
         raise GraphError(f'{name} has senders, but has been silent for {patience_s:g} s')
+    message_type(kind)  # read from its package, where it is not one of the common types
     end = math.inf if seconds is None else time.monotonic() + seconds
-    given = 0
-    while True:
+    left = math.inf if count is None else count
+    while left > 0:
         fresh, waiting[:] = waiting[:], []
-        for data, received_ns in fresh:
-            yield data, received_ns, kind
-            given += 1
-            if count is not None and given >= count:
-                return
+        for data in fresh[: int(min(left, len(fresh)))]:
+            message: Any = typestore().deserialize_cdr(data, kind)
+            print_json_line(asdict(message))
+        left -= len(fresh)
         if time.monotonic() > end:
             return
         client.serve(_PROMPT_S)
@@ -149,129 +140,3 @@ def _hint(client: GraphClient, name: str) -> str:
     if not there:
         return ': start a graph with `graph`'
     return '' if name in BY_NAME else f'; {nearest(name, there)}'
-
-
-def rate(
-    client: GraphClient,
-    name: str,
-    count: int | None,
-    seconds: float | None,
-    patience_s: float,
-    as_json: bool,
-) -> None:
-    """Measure until so many messages or seconds, or Ctrl-C, and print the statistics."""
-    times: list[int] = []
-    try:
-        for _, received_ns, _ in _messages(client, name, count, seconds, patience_s):
-            times.append(received_ns)
-    except KeyboardInterrupt:
-        pass
-    gaps = [(b - a) * 1e-6 for a, b in pairwise(times)]
-    if not gaps:
-        raise GraphError(f'{name}: {len(times)} message came: too few for a rate')
-    mean, spread = statistics.fmean(gaps), statistics.pstdev(gaps)
-    figures = {
-        'messages': len(times),
-        'rate_hz': 1e3 / mean if mean else math.inf,
-        'gap_min_ms': min(gaps),
-        'gap_max_ms': max(gaps),
-        'gap_std_ms': spread,
-    }
-    if as_json:
-        print(json.dumps({'topic': name} | figures))
-        return
-    print(
-        f'{name}: {figures["rate_hz"]:.1f} Hz over {len(times)} messages; gaps from '
-        f'{figures["gap_min_ms"]:.2f} to {figures["gap_max_ms"]:.2f} ms, std {spread:.2f} ms'
-    )
-
-
-def echo(
-    client: GraphClient,
-    name: str,
-    count: int | None,
-    seconds: float | None,
-    patience_s: float,
-    as_json: bool,
-) -> None:
-    """Print messages as they come."""
-    say: Callable[[Any], None] = _print_json if as_json else _print_lines
-    for data, _, kind in _messages(client, name, count, seconds, patience_s):
-        say(_decoded(data, kind))
-
-
-def _decoded(data: bytes, kind: type) -> Any:
-    if hasattr(kind, 'get_fields_and_field_types'):
-        return deserialize_message(data, kind)
-    return typestore().deserialize_cdr(data, TF_MESSAGE)
-
-
-def _print_json(message: Any) -> None:
-    print(json.dumps(fields_of(message)), flush=True)
-
-
-def _print_lines(message: Any) -> None:
-    for line in lines_of(message):
-        print(printable(line), flush=True)
-
-
-def lines_of(message: Any) -> list[str]:
-    """Put a message into lines, which may hold whatever a stranger wrote."""
-    if isinstance(message, JointState):
-        return [_joints(message)]
-    if isinstance(message, DiagnosticArray):
-        return list(_statuses(message))
-    rows = list(_leaves('', fields_of(message)))
-    return [f'{name}: {value}' if name else str(value) for name, value in rows]
-
-
-def fields_of(value: Any) -> Any:
-    """Turn a message into dicts, lists, numbers and texts that JSON can hold."""
-    if hasattr(value, 'get_fields_and_field_types'):
-        return {
-            name: fields_of(getattr(value, name)) for name in value.get_fields_and_field_types()
-        }
-    if is_dataclass(value):
-        return {field.name: fields_of(getattr(value, field.name)) for field in fields(value)}
-    if isinstance(value, bytes):
-        return list(value) if len(value) != 1 else value[0]
-    if isinstance(value, float) and not math.isfinite(value):
-        return str(value)
-    if isinstance(value, str | int | float | bool):
-        return value
-    return [fields_of(item) for item in value]
-
-
-def _stamp(message: Any) -> str:
-    stamp = message.header.stamp
-    return f'{stamp.sec}.{stamp.nanosec:09d}'
-
-
-def _joints(message: JointState) -> str:
-    """One row: ``bend_x=+0.1234 rad +0.0010 rad/s``."""
-    columns = {quantity: getattr(message, quantity) for quantity in _UNITS}
-    cells = []
-    for k, name in enumerate(message.name):
-        values = [
-            f'{column[k]:+.4f} {"N" if name in WIRES and quantity == "effort" else unit}'
-            for (quantity, column), unit in zip(columns.items(), _UNITS.values(), strict=True)
-            if k < len(column)
-        ]
-        cells.append(f'{name}={" ".join(values)}')
-    of = f'  ({message.header.frame_id})' if message.header.frame_id else ''
-    return f'{_stamp(message)}  {"  ".join(cells)}{of}'
-
-
-def _statuses(message: DiagnosticArray) -> Iterator[str]:
-    for status in message.status:
-        yield f'{_stamp(message)}  {_LEVELS[status.level[0] % 4]} {status.name}: {status.message}'
-        for item in status.values:
-            yield f'    {item.key}: {item.value}'
-
-
-def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    if isinstance(value, dict):
-        for key, inner in value.items():
-            yield from _leaves(f'{name}.{key}' if name else key, inner)
-    else:
-        yield name, value

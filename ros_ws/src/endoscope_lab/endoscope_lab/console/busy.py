@@ -61,7 +61,7 @@ _SESSION = (
     ('operate enable', r'ENABLED, session-\d+'),
     ('operate calibrate', r'(?s)class .* deg with probability .*bend_y can be bent from'),
     ('topics', r'motor/measured_js'),
-    ('topics --hz motor/measured_js --seconds 3', r'motor/measured_js: .* Hz over \d+ messages'),
+    ('topics --echo motor/measured_js --once', r'motor_x'),
     ('operate set console.source motion', r'console.source = motion, was none'),
     ('operate set compensator.mode physical', r'compensator.mode = physical'),
     ('operate status', r'ENABLED'),
