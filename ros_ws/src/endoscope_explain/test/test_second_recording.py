@@ -10,7 +10,6 @@ from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.rig import shipped_rig
 from endoscope_explain.compare import confirmed_by
 from endoscope_explain.explanation import Verdict
-from endoscope_explain.notebook.explained import Explained
 from endoscope_explain.pipeline import Inputs, Sources, explain_case
 from endoscope_explain.report.html_page import html_page
 from endoscope_explain.report.sentences import told
@@ -61,7 +60,7 @@ def test_what_does_not_is_named_in_doubt_everywhere(explained):
     refitted, augmented = (case.validation[name] for name in ('refitted', 'augmented'))
     worst = max((s for s in refitted if '_x' in s), key=lambda s: refitted[s].ratio)
     assert augmented[worst].ratio > refitted[worst].ratio
-    for text in (told(case), html_page(case), Explained(case)._repr_html_()):
+    for text in (told(case), html_page(case)):
         assert DOUBT in text
         assert 'stribeck_friction (in doubt)' in text
         assert 'leaves out stribeck_friction' not in text

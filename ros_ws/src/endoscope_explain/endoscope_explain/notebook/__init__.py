@@ -2,8 +2,7 @@
 
 from endoscope_core.errors import EndoscopeError
 from endoscope_explain.notebook.arrays import from_arrays
-from endoscope_explain.notebook.calls import explain, simulate
-from endoscope_explain.notebook.explained import Explained
+from endoscope_explain.notebook.calls import Explained, explain, simulate
 from endoscope_explain.notebook.signals import Signal, Signals, read
 
 __all__ = [

@@ -13,6 +13,7 @@ from endoscope_bags.cdr_encoding import encode_joint_states
 from endoscope_bags.message_types import JOINT_STATE
 from endoscope_core.errors import InputError, nearest
 from endoscope_core.physics.plant_file import JOINT_NAMES
+from endoscope_explain.notebook.arguments import SCRATCH, checked
 from endoscope_explain.notebook.signals import UNITS, Array, Signal, Signals, name_of, read
 from endoscope_explain.recording import (
     BENDING,
@@ -29,6 +30,7 @@ LATEST_S = 2.0**31
 """Of a stamp."""
 
 
+@checked
 def from_arrays(
     signals: Mapping[str, Signal | tuple[ArrayLike, ArrayLike]],
     *,
@@ -56,40 +58,38 @@ def from_arrays(
         A name is unknown, times run back, a value is not finite, or `out` exists.
     """
     known = _known()
-    by_topic: dict[str, dict[str, tuple[Array, Array]]] = {}
+    times: dict[str, tuple[str, Array]] = {}
+    columns: dict[str, dict[str, dict[str, Array]]] = {}
     for name, given in signals.items():
         if name not in known:
             raise InputError(f'{name} is not a signal: {nearest(name, known)}')
+        topic, of, quantity = known[name]
         pair = (given.time, given.values) if isinstance(given, Signal) else given
-        by_topic.setdefault(known[name][0], {})[name] = _checked(name, pair)
-    if not by_topic:
+        time, values = _checked(name, pair)
+        first, shared = times.setdefault(topic, (name, time))
+        if not np.array_equal(shared, time):
+            raise InputError(f'{name}: give it the times of {first}, as both are of {topic}')
+        columns.setdefault(topic, {}).setdefault(quantity, {})[of] = values
+    if not columns:
         raise InputError(f'no signals: give some of {", ".join(known)}')
-    streams = []
-    for topic, among in by_topic.items():
-        first, (time, _) = next(iter(among.items()))
-        columns: dict[str, dict[str, Array]] = {}
-        for name, (own, values) in among.items():
-            if not np.array_equal(own, time):
-                raise InputError(f'{name}: give it the times of {first}, as both are of {topic}')
-            _, of, quantity = known[name]
-            columns.setdefault(quantity, {})[of] = values
-        streams.append(_stream(topic, time, columns))
-    return _kept_in(out, streams)
+    scratch = None if out is not None else tempfile.TemporaryDirectory(prefix=SCRATCH)
+    path = Path(scratch.name) / 'arrays.mcap' if scratch is not None else Path(str(out))
+    with BagWriter(path) as bag:
+        bag.write_streams([_stream(topic, times[topic][1], of) for topic, of in columns.items()])
+    return replace(read(path), _kept=scratch)
 
 
 def commands_from(commands: Mapping[str, ArrayLike]) -> Signals:
     """Make a recording of `time` in s and angles in rad of joints or of motor shafts, each (N,)."""
-    angles = {name: values for name, values in commands.items() if name != TIME}
-    motors = [name for name in angles if name.startswith('motor_')]
-    if TIME not in commands or not angles or (motors and len(motors) < len(angles)):
+    angles = [name for name in commands if name != TIME]
+    motors = {name.startswith('motor_') for name in angles}
+    if TIME not in commands or len(motors) != 1:
         raise InputError(
             f'{", ".join(commands) or "nothing"}: give {TIME}, and angles of joints '
             '(bend_x, bend_y) or of motor shafts (motor_x, motor_y)'
         )
-    columns = {name: _checked(name, (commands[TIME], values)) for name, values in angles.items()}
-    time = next(iter(columns.values()))[0]
-    position = {name: values for name, (_, values) in columns.items()}
-    return _kept_in(None, [_stream(COMMAND if motors else DESIRED, time, {'position': position})])
+    topic = COMMAND if motors.pop() else DESIRED
+    return from_arrays({f'{topic}:{name}': (commands[TIME], commands[name]) for name in angles})
 
 
 def _known() -> dict[str, tuple[str, str, str]]:
@@ -142,11 +142,3 @@ def _stream(topic: str, time: Array, columns: Mapping[str, Mapping[str, Array]])
         effort=values.get('effort'),
     )
     return MessageStream(f'/endoscope/{topic}', JOINT_STATE, payloads, stamps)
-
-
-def _kept_in(out: str | Path | None, streams: list[MessageStream]) -> Signals:
-    scratch = None if out is not None else tempfile.TemporaryDirectory(prefix='endoscope-')
-    path = Path(scratch.name) / 'arrays.mcap' if scratch is not None else Path(str(out))
-    with BagWriter(path) as bag:
-        bag.write_streams(streams)
-    return replace(read(path), _kept=scratch)

@@ -2,33 +2,91 @@
 
 import tempfile
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, overload
 
 from numpy.typing import ArrayLike
 
 from endoscope_bags import open_bag
+from endoscope_core.atomic_output import atomic_directory
 from endoscope_core.choices import WAIVABLE
 from endoscope_core.errors import FileError, InputError, nearest
 from endoscope_core.physics import PlantDescription, load_plant, recording_faults
 from endoscope_core.physics.packing import pack
 from endoscope_core.rig import Rig, load_rig
 from endoscope_explain.answer_bag import write_answer
+from endoscope_explain.case import ExplainedCase
+from endoscope_explain.explanation import NamedEffect, NominalEstimate
 from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.many_bags import explained_cases
+from endoscope_explain.notebook.arguments import SCRATCH, checked
 from endoscope_explain.notebook.arrays import commands_from
-from endoscope_explain.notebook.explained import Explained
 from endoscope_explain.notebook.signals import Signals, read
 from endoscope_explain.pipeline import Progress, Sources
+from endoscope_explain.report.sentences import told
+from endoscope_explain.report.writing import report_mapping, write_report
 from endoscope_explain.search.levels import MOST_EFFECTS
 
 Plant = str | Path | PlantDescription
 Bag = str | Path | Signals
-ONE = (str, Path, Mapping)
-"""Is no sequence of bags; a mapping other than `Signals` is refused with a word about it."""
 
 
+@dataclass(frozen=True)
+class Explained:
+    """An explained recording; prints itself as the command does.
+
+    Attributes
+    ----------
+    case : ExplainedCase
+        Everything that is known about it.
+    """
+
+    case: ExplainedCase
+
+    @property
+    def verdict(self) -> str:
+        """One of the words of `report.json`, such as `missing_physics`."""
+        return str(self.case.verdict)
+
+    @property
+    def effects(self) -> tuple[NamedEffect, ...]:
+        """What the simulation left out, most certain first."""
+        return self.case.effects
+
+    @property
+    def parameters(self) -> Mapping[str, Mapping[str, NominalEstimate]]:
+        """Refitted parameters of the plant, by joint and name."""
+        return self.case.explanation.parameters
+
+    @property
+    def plant(self) -> PlantDescription:
+        """The improved plant, which `simulate` takes."""
+        return self.case.plant
+
+    @cached_property
+    def report(self) -> dict[str, Any]:
+        """What `report.json` says."""
+        return report_mapping(self.case)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write report.json, report.html and plant.yaml to a new or empty folder; return it.
+
+        Raises
+        ------
+        OutputError
+            There is something in it.
+        """
+        with atomic_directory(folder) as partial:
+            write_report(self.case, partial)
+        return Path(folder)
+
+    def __repr__(self) -> str:
+        return f'{self.case.recording.name}: {self.verdict}. {told(self.case)}'
+
+
+@checked
 def simulate(
     plant: Plant,
     commands: Bag | Mapping[str, ArrayLike],
@@ -63,7 +121,9 @@ def simulate(
     EndoscopeError
         The plant or the commands cannot be used, or `out` exists.
     """
-    scratch = tempfile.TemporaryDirectory(prefix='endoscope-')
+    if noise is not None and noise < 0:
+        raise InputError(f'noise is {noise}: give a seed of 0 or above')
+    scratch = tempfile.TemporaryDirectory(prefix=SCRATCH)
     if isinstance(commands, Mapping) and not isinstance(commands, Signals):
         commands = commands_from(commands)
     target = Path(scratch.name) / 'simulated.mcap' if out is None else Path(out)
@@ -78,7 +138,8 @@ def explain(bag: Sequence[Bag], plant: Plant, **options: Any) -> list[Explained]
 
 
 # The overloads tell one result from several, and leave the options to the signature below.
-def explain(  # type: ignore[misc]
+@checked  # type: ignore[misc]
+def explain(
     bag: Bag | Sequence[Bag],
     plant: Plant,
     *,
@@ -141,9 +202,10 @@ def explain(  # type: ignore[misc]
     for topic in without:
         if topic not in WAIVABLE:
             raise InputError(f'without {topic!r}: {nearest(topic, WAIVABLE)}')
-    bags = [bag] if isinstance(bag, ONE) else list(bag)
+    alone = isinstance(bag, Bag)
+    bags = [bag] if isinstance(bag, Bag) else list(bag)
     seconds = (
-        [validate] * len(bags) if validate is None or isinstance(validate, ONE) else list(validate)
+        [validate] * len(bags) if validate is None or isinstance(validate, Bag) else list(validate)
     )
     if not bags or len(seconds) != len(bags):
         raise InputError(
@@ -169,7 +231,7 @@ def explain(  # type: ignore[misc]
     ]
     cases = explained_cases(sources, jobs, same_physics=same_physics, progress=progress)
     found = [Explained(case) for case in cases]
-    return found[0] if isinstance(bag, ONE) else found
+    return found[0] if alone else found
 
 
 def _plant(plant: Plant) -> PlantDescription:
@@ -189,10 +251,4 @@ def _rig(rig: str | Path | Rig | None) -> Rig | None:
 
 
 def _path(bag: Bag) -> Path:
-    if isinstance(bag, Signals):
-        return bag.path
-    if isinstance(bag, str | Path):
-        return Path(bag)
-    raise InputError(
-        f'{type(bag).__name__} is not a bag: give a path, or what read or from_arrays gave'
-    )
+    return bag.path if isinstance(bag, Signals) else Path(bag)

@@ -1,10 +1,7 @@
-"""Everything that a recording measured or commanded, as arrays by name, in tables and pictures."""
+"""Everything that a recording measured or commanded, as arrays by name."""
 
-import base64
-import io
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,31 +12,16 @@ from endoscope_bags import open_bag
 from endoscope_bags.errors import BagError
 from endoscope_bags.message_types import JOINT_STATE
 from endoscope_core.errors import EndoscopeError, nearest
+from endoscope_explain.notebook.arguments import checked
 from endoscope_explain.recording import MOTOR, WIRES
 from endoscope_explain.report.sentences import table
-from endoscope_pages import html_table
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from pandas import DataFrame
-
-OUTSIDE = {'loc': 'upper left', 'bbox_to_anchor': (1.0, 1.0), 'fontsize': 7, 'frameon': False}
-"""Where a legend hides no curve."""
-
-
-def embedded(figure: 'Figure') -> str:
-    """Return a picture as an HTML element that holds all of it."""
-    content = io.BytesIO()
-    # As pixels: a minute at 1 kHz is ten thousand times as large in vectors.
-    figure.savefig(content, format='png', dpi=90)
-    picture = base64.b64encode(content.getvalue()).decode()
-    return f'<img style="max-width:100%" src="data:image/png;base64,{picture}">'
-
 
 Array = NDArray[np.float64]
 
 UNITS = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m'}
-_COLOURS = ('#2f6fb7', '#b3261e', '#136b4f', '#a15c00', '#52606d', '#7b3fa0')
 
 
 class UnknownSignalError(EndoscopeError, KeyError):
@@ -73,9 +55,6 @@ class Signal:
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         return np.array(self.values, dtype=dtype, copy=copy)
 
-    def __repr__(self) -> str:
-        return f'{self.name}: {", ".join(_cells(self)[1:])}'
-
 
 @dataclass(frozen=True)
 class Signals(Mapping[str, Signal]):
@@ -101,7 +80,7 @@ class Signals(Mapping[str, Signal]):
             return self.by_name[name]
         except KeyError:
             raise UnknownSignalError(
-                f'{self.path}: no signal {name}: {nearest(name, self.by_name)}'
+                f'{self.path.name}: no signal {name}: {nearest(str(name), self.by_name)}'
             ) from None
 
     def __iter__(self) -> Iterator[str]:
@@ -115,6 +94,7 @@ class Signals(Mapping[str, Signal]):
         """Seconds from the first stamp to the last."""
         return max(float(signal.time[-1]) for signal in self.values())
 
+    @checked
     def to_frame(self, names: Sequence[str] | None = None) -> 'DataFrame':
         """Return signals as the columns of a table, a row for each stamp that one of them has.
 
@@ -136,7 +116,9 @@ class Signals(Mapping[str, Signal]):
         try:
             from pandas import DataFrame, Index
         except ImportError as error:
-            raise EndoscopeError('to_frame needs pandas: pip install pandas') from error
+            raise EndoscopeError(
+                'to_frame needs pandas: `make -C ros_ws pandas` installs it'
+            ) from error
         signals = [self[name] for name in (self if names is None else names)]
         time = np.unique(np.concatenate([signal.time for signal in signals]))
         columns = {signal.name: np.full(len(time), np.nan) for signal in signals}
@@ -144,61 +126,15 @@ class Signals(Mapping[str, Signal]):
             columns[signal.name][np.searchsorted(time, signal.time)] = signal.values
         return DataFrame(columns, Index(time, name='time'))
 
-    def _rows(self) -> list[tuple[str, ...]]:
-        return [_cells(signal) for signal in self.values()]
-
     def __repr__(self) -> str:
-        return f'{self.path.name}: {self.duration:.3f} s\n{table(_HEAD, self._rows())}'
-
-    def _repr_html_(self) -> str:
-        return (
-            f'<p><b>{escape(self.path.name)}</b>: {self.duration:.3f} s</p>'
-            f'{html_table(_HEAD, self._rows())}{embedded(self.plot())}'
-        )
-
-    def plot(self, names: Sequence[str] | None = None, beside: 'Signals | None' = None) -> 'Figure':
-        """Draw signals over time, those of one unit and topic together.
-
-        Parameters
-        ----------
-        names : sequence of str, optional
-            Which; all if not given.
-        beside : Signals, optional
-            Another recording whose signals of the same names are drawn dashed.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            Angles in degrees.
-        """
-        from matplotlib.figure import Figure
-
-        panels: dict[tuple[str, str], list[str]] = {}
-        for name in self if names is None else names:
-            panels.setdefault((name.partition(':')[0], self[name].unit), []).append(name)
-        figure = Figure(figsize=(9.0, 1.9 * len(panels) + 0.6), layout='constrained')
-        axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-        for (topic, unit), among, axis in zip(panels, panels.values(), axes.tolist(), strict=True):
-            scale, shown = _for_a_person(unit)
-            for colour, name in zip(_COLOURS * len(among), among, strict=False):
-                label = name.partition(':')[2]
-                axis.plot(self[name].time, scale * self[name].values, lw=1.0, c=colour, label=label)
-                if beside is not None and name in beside.by_name:
-                    other = beside[name]
-                    shift = beside.origin - self.origin
-                    axis.plot(other.time + shift, scale * other.values, '--', lw=1.1, c='#1f2933')
-            axis.set_ylabel(f'{topic}\n{shown}', fontsize=8)
-            axis.legend(**OUTSIDE)
-            axis.grid(alpha=0.3)
-        axes[-1].set_xlabel('time [s]')
-        if beside is not None:
-            figure.suptitle(f'{self.path.name}, dashed: {beside.path.name}', fontsize=9)
-        return figure
+        rows = [_cells(signal) for signal in self.values()]
+        return f'{self.path.name}: {self.duration:.3f} s\n{table(_HEAD, rows)}'
 
 
 _HEAD = ('signal', 'unit', 'samples', 'rate', 'range')
 
 
+@checked
 def read(bag: str | Path, *, namespace: str | None = None) -> Signals:
     """Read all joint states of a recording.
 
@@ -257,9 +193,3 @@ def _cells(signal: Signal) -> tuple[str, ...]:
     finite = signal.values[np.isfinite(signal.values)]
     span = f'{finite.min():.4g} to {finite.max():.4g}' if len(finite) else '-'
     return signal.name, signal.unit, str(len(signal)), rate, span
-
-
-def _for_a_person(unit: str) -> tuple[float, str]:
-    if unit.startswith('rad'):
-        return float(np.degrees(1.0)), unit.replace('rad', 'deg')
-    return 1.0, unit
