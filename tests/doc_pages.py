@@ -34,6 +34,7 @@ NOT_RUN = {
 }
 """Words after the language with which a block is not run, and why."""
 
+_DATE = r'20\d\d-\d\d-\d\dT\d\d:\d\d:\d\d'
 _FENCE = re.compile(r'^(`{3,})([^`\n]*)\n(.*?)^\1$', re.MULTILINE | re.DOTALL)
 
 
@@ -153,7 +154,7 @@ def _start(command: Command, folder: Path, environment: dict[str, str]) -> subpr
     )
     said = ''
     assert command.shown, f'{command.text}: show the line by which one sees that it is ready'
-    while not _pattern(command.shown).search(said):
+    while not pattern(command.shown).search(said):
         line = process.stdout.readline()
         assert line, f'{command.text} ended:\n{said}'
         said += line
@@ -162,12 +163,15 @@ def _start(command: Command, folder: Path, environment: dict[str, str]) -> subpr
 
 def _compare(command: Command, output: str, where: str) -> None:
     if command.shown:
-        assert _pattern(command.shown).fullmatch(output.rstrip()), (
+        assert pattern(command.shown).fullmatch(output.rstrip()), (
             f'{where}: $ {command.text}\nshows\n' + '\n'.join(command.shown) + f'\nsays\n{output}'
         )
 
 
-def _pattern(shown: list[str]) -> re.Pattern:
-    """Return what output has to match, in which `...` stands for anything."""
-    pieces = '\n'.join(shown).rstrip().split('...')
-    return re.compile('.*'.join(map(re.escape, pieces)), re.DOTALL)
+def pattern(shown: list[str]) -> re.Pattern:
+    """Return what output has to match: `...` stands for anything, a date for any date."""
+    forms = [
+        '.*' if piece == '...' else _DATE if re.fullmatch(_DATE, piece) else re.escape(piece)
+        for piece in re.split(rf'(\.\.\.|{_DATE})', '\n'.join(shown).rstrip())
+    ]
+    return re.compile(''.join(forms), re.DOTALL)

@@ -1,6 +1,7 @@
 """`endoscope bag info`, `endoscope bag recover` and `endoscope bag list`."""
 
 import json
+import re
 
 import pytest
 
@@ -101,21 +102,29 @@ def test_the_list_tells_faults_with_time_and_reason(tmp_path, capsys):
     path = bag_of_a_fault(tmp_path)
     with BagWriter(tmp_path / 'plain.mcap') as writer:
         writer.write_raw('/stream', STRING, encode_string('x'), START - 10**9)
+    writer = BagWriter(tmp_path / 'live', atomic=False, chunk_seconds=0.0)
+    assert main(['bag', 'list', str(tmp_path)]) == 0
+    assert 'being recorded' in capsys.readouterr().out
+    for k in range(3):
+        writer.write_raw('/stream', STRING, encode_string('x'), START + 10**10 + k)
     (tmp_path / 'notes.txt').write_text('no recording')
     (tmp_path / 'broken.mcap').write_text('no recording either')
     assert main(['bag', 'list', str(tmp_path)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].endswith('broken.mcap')
     assert 'not an MCAP recording' in lines[1] or 'text, no recording' in lines[1]
-    assert lines[2].startswith('recording')
+    assert lines[2].startswith('recording  2026-09-21T14:13:19 UTC')
     assert lines[2].endswith('plain.mcap')
     assert lines[3].startswith('fault')
     assert lines[3].endswith(path.name)
     assert 'fault at 2026-09-21T14:13:24.999' in lines[4]
     assert 'tension of wire_x_pos' in lines[4]
     assert 'mark at' in lines[5]
+    assert re.match('recording  2026-09-21T14:13:30 UTC .* live', lines[6])
+    assert lines[7:] == ['    being recorded']
     assert main(['bag', 'list', str(tmp_path), '--json']) == 0
     told = json.loads(capsys.readouterr().out)
+    writer.discard()
     assert told[2]['events'][0] == {'kind': 'fault', 'at_ns': START + 4999 * MS, 'reason': REASON}
 
 

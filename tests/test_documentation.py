@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from doc_pages import LANGUAGES, NOT_RUN, PAGES, ROOT, WORKSPACE, blocks, prose, run_page
+from doc_pages import LANGUAGES, NOT_RUN, PAGES, ROOT, WORKSPACE, blocks, pattern, prose, run_page
 
 from endoscope_bringup.commands import COMMANDS
 from endoscope_bringup.subcommands import commands_of_other_packages
@@ -104,6 +104,13 @@ def test_readme_names_every_command() -> None:
 @pytest.mark.timeout(600)
 def test_what_a_page_shows_runs(page: Path, tmp_path: Path) -> None:
     run_page(page, tmp_path)
+
+
+def test_a_date_that_is_shown_stands_for_dates_alone() -> None:
+    shown = pattern(['recording  2026-11-29T02:16:16 UTC ... bag'])
+    assert shown.fullmatch('recording  2031-01-02T03:04:05 UTC  9.0 s  bag')
+    assert not shown.fullmatch('recording  56910064228-01-02T03:04:05 UTC  9.0 s  bag')
+    assert not shown.fullmatch('recording  2237-01-02T03:04:05 UTC  9.0 s  bag')
 
 
 @pytest.fixture(scope='module')

@@ -1,6 +1,7 @@
 """Takes chunks of messages and puts them into the file of a recording, in a thread if asked."""
 
 import errno
+import fcntl
 import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -45,6 +46,18 @@ def write_error(error: OSError, name: str) -> BagWriteError:
     return BagWriteError(f'{name}: {error.strerror}; recording ended there')
 
 
+def is_being_written(path: Path) -> bool:
+    """Tell whether a `ChunkSink`, of whatever process, has a file open."""
+    with path.open('rb') as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        except OSError:  # a disk without locks
+            return False
+    return False
+
+
 @dataclass(frozen=True)
 class TopicRecord:
     """A topic as the file knows it."""
@@ -72,6 +85,9 @@ class ChunkSink:
         self._worker = ThreadPoolExecutor(1, 'bag_writer') if threaded else None
         self._jobs: list[Future[None]] = []
         self._file = path.open('xb', buffering=0)
+        # Held until the file is closed, by whatever end of the process; see `is_being_written`.
+        with suppress(OSError):
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         try:
             self._require_room(0)
             self._mcap = McapFile(self._file, LIBRARY)

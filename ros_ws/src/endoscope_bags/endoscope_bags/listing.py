@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from endoscope_bags.chunk_sink import is_being_written
 from endoscope_bags.errors import BagError, BagNotFoundError
 from endoscope_bags.event_bag import Event, events_of
 from endoscope_bags.mcap_summary import McapSummary, read_summary
@@ -15,6 +16,7 @@ from endoscope_bags.recording import open_bag
 from endoscope_core.errors import EndoscopeError, printable
 
 RECORDING = 'recording'
+BEING_RECORDED = 'being recorded'
 _SUFFIXES = ('.mcap', SQLITE3)
 
 
@@ -28,7 +30,7 @@ class BagEntry:
     duration_s: float
     size: int  # bytes
     events: tuple[Event, ...]  # why it was kept
-    trouble: str  # why it cannot be read, or that it was cut off; else empty
+    trouble: str  # why it cannot be read, that it was cut off, or `BEING_RECORDED`; else empty
 
     def as_json(self) -> dict[str, Any]:
         """Return it as plain data."""
@@ -36,9 +38,10 @@ class BagEntry:
 
     def lines(self) -> list[str]:
         """Say it: one line, and one for each event or trouble."""
-        begin = f'{np.datetime64(self.start_ns, "s")}Z' if self.start_ns else '-'
+        second = np.datetime64(self.start_ns, 'ns').astype('datetime64[s]')
+        begin = f'{second} UTC' if self.start_ns else '-'
         size = f'{self.duration_s:10.3f} s  {self.size / 1e6:9.2f} MB'
-        told = [f'{self.kind:9}  {begin:20}  {size}  {self.name}']
+        told = [f'{self.kind:9}  {begin:23}  {size}  {self.name}']
         told += [f'    {event}' for event in self.events]
         return told + ([f'    {self.trouble}'] if self.trouble else [])
 
@@ -65,15 +68,17 @@ def _is_bag(path: Path) -> bool:
 
 
 def _entry(path: Path) -> BagEntry:
-    trouble = ''
+    trouble, size, being_recorded = '', 0, False
     try:
         files = bag_files(path)
         size = sum(file.stat().st_size for file in files)
+        being_recorded = any(map(is_being_written, files))
         told = _summary(files)
         if told is None:
             told, trouble = _read_whole(path)
     except (EndoscopeError, OSError) as error:
-        return BagEntry(path.name, RECORDING, 0, 0.0, 0, (), str(error))
+        trouble = BEING_RECORDED if being_recorded else str(error)
+        return BagEntry(path.name, RECORDING, 0, 0.0, size, (), trouble)
     events = tuple(events_of(told.metadata))
     return BagEntry(
         path.name,
@@ -82,7 +87,7 @@ def _entry(path: Path) -> BagEntry:
         (told.end_ns - told.start_ns) * 1e-9,
         size,
         events,
-        trouble,
+        BEING_RECORDED if being_recorded else trouble,
     )
 
 
