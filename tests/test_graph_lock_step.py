@@ -5,7 +5,9 @@ import pytest
 from simulated_graph import SimulatedGraph
 
 from endoscope_core.physics import PlantDescription, SensorModel, simulate
+from endoscope_nodes.graph import ALL_NODES, SHOWING_NODES
 from endoscope_nodes.names import MOTORS, WIRES
+from endoscope_nodes.nodes.recorder import RecorderNode
 from endoscope_nodes.nodes.simulation_clock import BarrierTimeout
 
 STREAMS = {
@@ -84,3 +86,14 @@ def test_the_topic_that_is_waited_for_is_named(missing, topic):
         pytest.raises(BarrierTimeout, match=topic),
     ):
         graph.advance(0.1)
+
+
+def test_no_entity_of_the_composed_graph_has_an_event_of_the_middleware(tmp_path):
+    """Such events can dead-lock the executor of the nodes, or crash it when they are destroyed."""
+    shown = (*SHOWING_NODES, RecorderNode)
+    with SimulatedGraph(extra=shown, overrides={'recorder': {'bag': f'{tmp_path}/bag'}}) as graph:
+        assert {type(node) for node in graph.runtime.nodes} >= set(ALL_NODES)
+        for node in graph.runtime.nodes:
+            assert not list(node.waitables), node.get_name()
+            for entity in (*node.publishers, *node.subscriptions):
+                assert not entity.event_handlers, (node.get_name(), entity.topic_name)

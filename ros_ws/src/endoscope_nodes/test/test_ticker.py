@@ -19,8 +19,10 @@ class Beaten(EndoscopeNode):
         super().__init__('beaten', runtime)
         self.beats = []
         self.slow = []
+        self.fast = []
         self.ticker.add(lambda stamp, periods: self.beats.append((stamp, periods)))
         self.ticker.every(0.05, lambda: self.slow.append(self.ticker.now_ns()))
+        self.ticker.every(0.01, lambda: self.fast.append(self.ticker.now_ns()))
 
 
 @pytest.fixture
@@ -85,6 +87,31 @@ def test_real_time_accounts_for_every_millisecond():
             assert stamp - before == periods * MS
         assert node.ticker.ticks + node.ticker.missed == sum(p for _, p in node.beats)
         assert abs(stamps[-1] - time.time_ns()) < 5_000 * MS
+
+
+def test_a_stall_is_one_beat_with_the_time_that_passed_and_no_burst():
+    with Runtime(['--ros-args'], Context(), 229) as runtime:
+        node = runtime.add(Beaten)
+        done, slow_before = Future(), []
+
+        def stall(stamp, _):
+            if len(node.beats) == 50:
+                slow_before.extend((len(node.fast), len(node.slow)))
+                time.sleep(0.2)
+            if len(node.beats) > 51 and stamp > node.beats[50][0] + 100 * MS and not done.done():
+                done.set_result(None)
+
+        runtime.ticker.add(stall)
+        assert runtime.spin_until(done, 30.0)
+    (before, _), (first, periods) = node.beats[49:51]
+    assert periods >= 199
+    assert first - before == periods * MS
+    after = [count for stamp, count in node.beats[51:] if stamp <= first + 50 * MS]
+    assert min(after) >= 1
+    assert sum(after) <= 50
+    for calls, number, period in zip((node.fast, node.slow), slow_before, (10, 50), strict=True):
+        since = [call for call in calls[number:] if call <= first + 50 * MS]
+        assert len(since) <= 2 + 50 // period
 
 
 def test_a_slower_beat_counts_milliseconds():

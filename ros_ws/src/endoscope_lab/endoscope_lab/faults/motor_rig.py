@@ -9,7 +9,6 @@ import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
-from rclpy.node import Node
 from rclpy.task import Future
 from std_msgs.msg import String
 
@@ -30,6 +29,7 @@ from endoscope_nodes.nodes.master import MasterNode
 from endoscope_nodes.nodes.motor_driver import MotorDriverNode
 from endoscope_nodes.nodes.recorder import RecorderNode
 from endoscope_nodes.nodes.supervisor import SupervisorNode
+from endoscope_nodes.runtime.eventless_node import EventlessNode
 from endoscope_nodes.runtime.private_domain import process_domain
 from endoscope_nodes.runtime.qos import EVENT, RESULT, SENSOR_ASKED, SENSOR_OFFERED
 from endoscope_nodes.runtime.runtime import Runtime
@@ -87,7 +87,7 @@ class MotorRig(ClosedOnExit):
                 self.runtime.add(factory)
         self.runtime.add(RecorderNode)
         self.runtime.prepare()
-        self.probe = Node('probe', context=self.runtime.context, namespace='endoscope')
+        self.probe = EventlessNode('probe', context=self.runtime.context, namespace='endoscope')
         self.runtime.executor.add_node(self.probe)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._orders = self.probe.create_publisher(String, STATE_COMMAND, EVENT)
@@ -117,7 +117,7 @@ class MotorRig(ClosedOnExit):
             parameters[name] |= {'tick_rate': RATE_HZ, 'rig_file': str(rig_file)}
         return parameters
 
-    def node(self, name: str) -> Node:
+    def node(self, name: str) -> EventlessNode:
         """Give a node of this process; StopIteration if there is none of that name."""
         return next(node for node in self.runtime.nodes if node.get_name() == name)
 

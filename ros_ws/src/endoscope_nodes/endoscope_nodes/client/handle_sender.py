@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 from rclpy.duration import Duration
-from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from sensor_msgs.msg import Joy
 
@@ -13,8 +12,6 @@ from endoscope_nodes.runtime.streams import JointPublisher
 
 CLUTCH_PERIOD_NS = 100_000_000
 _RECEIVED = Duration(seconds=0.5)
-# An executor that waits for events of a publisher fails where another thread closes it.
-_NO_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
 
 
 def handle_senders(node: Node) -> list[str]:
@@ -36,10 +33,8 @@ class HandleSender:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._angles = JointPublisher(
-            node, MASTER_MEASURED, JOINTS, ('position',), SENSOR_OFFERED, _NO_EVENTS
-        )
-        self._clutch = node.create_publisher(Joy, MASTER_CLUTCH, EVENT, event_callbacks=_NO_EVENTS)
+        self._angles = JointPublisher(node, MASTER_MEASURED, JOINTS, ('position',), SENSOR_OFFERED)
+        self._clutch = node.create_publisher(Joy, MASTER_CLUTCH, EVENT)
         self._said_ns = 0
         self.clutch = False  # whether it is held, as was last said
 

@@ -6,7 +6,6 @@ from typing import Any
 from rclpy.clock import Clock, ClockType, ROSClock
 from rclpy.event_handler import QoSSubscriptionEventType
 from rclpy.impl.implementation_singleton import rclpy_implementation
-from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 from rclpy.time import Time
@@ -15,11 +14,12 @@ from std_srvs.srv import Trigger
 from endoscope_nodes.names import CLOCK_NODE
 from endoscope_nodes.runtime.declared_parameters import declare_parameters
 from endoscope_nodes.runtime.diagnostics import Diagnostics
+from endoscope_nodes.runtime.eventless_node import EventlessNode
 from endoscope_nodes.runtime.node_context import NAMESPACE, NodeContext
 from endoscope_nodes.runtime.parameters import ParameterError, changed
 
 
-class EndoscopeNode(Node):
+class EndoscopeNode(EventlessNode):
     """A node in the ``/endoscope`` namespace that lives in a process with others."""
 
     def __init__(self, name: str, context: NodeContext) -> None:

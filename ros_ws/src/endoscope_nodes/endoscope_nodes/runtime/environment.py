@@ -14,6 +14,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from endoscope_core.choices import LOG_LEVEL_VARIABLE, LOG_LEVELS
+from endoscope_nodes.runtime.eventless_node import EventlessNode
 from endoscope_nodes.runtime.parameters import ParameterError
 
 RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
@@ -104,7 +105,7 @@ def joined_node(name: str, namespace: str, domain: int | None = None) -> Iterato
 @contextmanager
 def _node(name: str, namespace: str, context: Context) -> Iterator[Node]:
     try:
-        node = Node(
+        node = EventlessNode(
             name,
             context=context,
             namespace=f'/{namespace.strip("/")}',

@@ -16,6 +16,7 @@ from endoscope_core.physics.effects import describe
 from endoscope_core.rig import Rig, load_rig
 from endoscope_nodes.names import CLOCK, CLOCK_NODE, JOINTS
 from endoscope_nodes.runtime.declared_parameters import check_sections, declare_parameters
+from endoscope_nodes.runtime.eventless_node import EventlessNode
 from endoscope_nodes.runtime.measured_pose import MeasuredPose
 from endoscope_nodes.runtime.node_parameters import BeatParameters, RealTimeParameters
 from endoscope_nodes.runtime.parameters import ParameterError, changed
@@ -114,7 +115,7 @@ class NodeContext:
 
     @contextmanager
     def _asked(self, name: str) -> Iterator[Node]:
-        node = Node(
+        node = EventlessNode(
             name,
             context=self.context,
             namespace=NAMESPACE,

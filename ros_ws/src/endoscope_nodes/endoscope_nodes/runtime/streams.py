@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
-from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -49,13 +48,12 @@ class JointPublisher:
         names: Sequence[str],
         fields: Sequence[str],
         qos: QoSProfile,
-        events: PublisherEventCallbacks | None = None,
     ) -> None:
         self._names, self._fields = names, fields
         self._pack = struct.Struct(f'<{len(names)}d').pack_into
         self._stamp = struct.Struct('<iI')
         self._node = node
-        self._publisher = node.create_publisher(JointState, topic, qos, event_callbacks=events)
+        self._publisher = node.create_publisher(JointState, topic, qos)
         # Faster, where nobody counts what is published (EndoscopeNode.create_publisher).
         counted = 'publish' in vars(self._publisher)
         handle = self._publisher.handle

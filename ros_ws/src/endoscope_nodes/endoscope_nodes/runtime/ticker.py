@@ -193,6 +193,7 @@ class Ticker:
 
     def _on_timer(self) -> None:
         beats = (time.monotonic_ns() - self._last_ns) // (self._stride * TICK_NS)
+        # What expired in a stall is one beat, and whatever else is handed out of it none.
         if beats <= 0:
             return
         periods = beats * self._stride
