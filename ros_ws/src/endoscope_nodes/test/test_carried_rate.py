@@ -1,6 +1,10 @@
 import re
 
+import pytest
+
 from endoscope_nodes import graph
+
+pytestmark = pytest.mark.nightly
 
 
 def test_it_is_said_what_arrives_and_which_rate_is_carried(monkeypatch, capfd):

@@ -50,7 +50,13 @@ def shown(**given):
 
 @pytest.mark.parametrize(
     'given',
-    [{}, {'ROS_AUTOMATIC_DISCOVERY_RANGE': ''}, {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}],
+    [
+        {},
+        *(
+            pytest.param({NAMES[0]: range_}, marks=pytest.mark.nightly)
+            for range_ in ('', 'LOCALHOST')
+        ),
+    ],
 )
 def test_by_default_no_other_machine_can_reach_the_ports(given):
     # A process that stands still would take others with it through memory that they share.
@@ -87,7 +93,11 @@ def test_a_range_that_ros_would_take_for_the_subnet_is_refused(monkeypatch, unkn
     ('given', 'used'),
     [
         ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'}, 'SUBNET'),
-        ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT'}, 'SYSTEM_DEFAULT'),
+        pytest.param(
+            {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT'},
+            'SYSTEM_DEFAULT',
+            marks=pytest.mark.nightly,
+        ),
         ({'ROS_STATIC_PEERS': '192.0.2.77'}, 'LOCALHOST'),
     ],
 )
