@@ -10,7 +10,7 @@ from endoscope_lab.commands import BENCHES
 
 WORKSPACE = Path(__file__).parents[1]
 ENDOSCOPE = Path(sys.executable).with_name('endoscope')
-ONCE = ('--seeds', '--seed', '--tubes', '--n', '--repetitions', '--rounds', '--sound', '--nominal')
+ONCE = ('--seeds', '--seed', '--repetitions', '--sound', '--nominal')
 """Options with which a bench is tried once."""
 PAGE = """# Nightly run
 

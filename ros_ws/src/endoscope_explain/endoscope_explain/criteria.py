@@ -1,8 +1,7 @@
 """Numbers by which explanations are judged, derived from cases whose truth is known.
 
-Made by `endoscope bench criteria` from 207 cases of `endoscope bench concealed`, seeds 421 to 444
-of catalogue, leave_a_form_out, other_sheath, nulls, mixed_forms, sinusoid, teleoperation, pairs,
-other_simulator.
+Made by `endoscope bench concealed --derive` from 207 cases, seeds 421 to 444 of catalogue,
+leave_a_form_out, other_sheath, nulls, mixed_forms, sinusoid, teleoperation, pairs, other_simulator.
 """
 
 BEYOND_FORM = 1

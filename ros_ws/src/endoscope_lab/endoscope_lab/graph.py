@@ -19,6 +19,7 @@ from std_msgs.msg import String
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.exit_status import ClosedOnExit
 from endoscope_core.safety import OperatingState
+from endoscope_lab import recorder
 from endoscope_lab.bench import cpu_seconds, spread
 from endoscope_lab.faults.node_processes import NODES, NodeProcesses
 from endoscope_lab.faults.operator import Operator
@@ -34,6 +35,8 @@ PROCESS_RATES = (1000, 500, 250, 125)
 
 def run(args: argparse.Namespace) -> int:
     """Print the figures; return 1 if a target is missed."""
+    if args.recorder:
+        return recorder.run(args.seconds)
     reached = composed_graph_is_carried(args.seconds)
     speed = lock_step_speed(min(args.seconds, 20.0))
     print(f'lock-step: {speed:.1f} times real time', flush=True)

@@ -29,15 +29,15 @@ from endoscope_explain.pipeline import Inputs, Sources, explain_case
 from endoscope_explain.recording import Recording
 from endoscope_explain.takes import APART_S, inputs_joined
 from endoscope_lab.bench import keep_row, rows_so_far, side_by_side, table_head, table_row
+from endoscope_lab.concealed.another_rig import Laws
+from endoscope_lab.concealed.another_rig import read as read_another
 from endoscope_lab.concealed.judge import Case
+from endoscope_lab.concealed.other_simulator import of_other_simulator
 from endoscope_lab.concealed.readings import TRACKER_TICKS, Readings, as_sensed
 from endoscope_lab.concealed.readings import read as read_own
+from endoscope_lab.concealed.row import Row
 from endoscope_lab.concealed.strata import drawn_case
-from endoscope_lab.concealed.trial import Row, failed, judged_row
-from endoscope_lab.proof import OTHER
-from endoscope_lab.proof.another_rig import Laws
-from endoscope_lab.proof.another_rig import read as read_another
-from endoscope_lab.proof.drawing import drawn
+from endoscope_lab.concealed.trial import failed, judged_row
 
 Array = NDArray[np.float64]
 
@@ -160,7 +160,7 @@ def asked(
 def drawn_rig(stratum: str, seed: int) -> tuple[Case, Callable[[Array], Readings]]:
     """A concealed rig, and what is read of it under a shaft command (N, J), every ms."""
     if stratum == KINDS['other simulator']:
-        case, truth = drawn(OTHER, seed, 0)
+        case, truth = of_other_simulator(np.random.default_rng([seed, 0]), None)
         case = replace(case, stratum=stratum, seed=seed)
         ((_, joint),) = case.true.joints.items()
         return case, partial(read_another, joint, Laws(**truth['laws']))

@@ -1,6 +1,5 @@
-"""`endoscope bench recorder`: how much the recorder keeps up with, and what it costs."""
+"""How much the recorder keeps up with, and what it costs."""
 
-import argparse
 import os
 import subprocess
 import sys
@@ -27,9 +26,9 @@ _STEP_S = 0.001
 _MATCHING_TIMEOUT_S = 20.0
 
 
-def run(args: argparse.Namespace) -> int:
+def run(seconds: float) -> int:
     """Print a line for each rate; return 1 if the target is missed."""
-    return 0 if [_keeps_up(rate, args.seconds) for rate in RATES][-1] else 1
+    return 0 if [_keeps_up(rate, seconds) for rate in RATES][-1] else 1
 
 
 def _keeps_up(rate: int, seconds: float) -> bool:

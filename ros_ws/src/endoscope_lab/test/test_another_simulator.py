@@ -25,7 +25,7 @@ from endoscope_core.identification.plant_fit import plants_of_calibration
 from endoscope_core.metrics import tracking_rmse
 from endoscope_core.physics import JointParameters, PlantDescription, SensorModel, simulate
 from endoscope_core.signals import calibration_motion, periodic_signal
-from endoscope_lab.proof import sliding_nodes
+from endoscope_lab.concealed import sliding_nodes
 
 TICK, NODES, SPREAD = 1e-3, 12, 0.7
 

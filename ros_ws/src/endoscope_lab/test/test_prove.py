@@ -12,13 +12,13 @@ from endoscope_core.physics import PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.recording import recording_from_bag
 from endoscope_lab.concealed import motions
+from endoscope_lab.concealed.another_rig import FEW_NODES, FORMS, Laws, drawn_laws, read
 from endoscope_lab.concealed.judge import Statement, judged, law_of_effect
 from endoscope_lab.concealed.readings import as_sensed
 from endoscope_lab.concealed.readings import read as read_of_kernel
 from endoscope_lab.concealed.rigs import described_rig, true_rig
 from endoscope_lab.concealed.strength import moved
 from endoscope_lab.proof import SIMULATORS, SLAVE, sentences
-from endoscope_lab.proof.another_rig import FEW_NODES, FORMS, Laws, drawn_laws, read
 from endoscope_lab.proof.drawing import drawn
 from endoscope_lab.proof.slave import tracked
 from endoscope_lab.proof.trial import (

@@ -7,7 +7,8 @@ import pytest
 from endoscope_bringup.cli import main
 from endoscope_core.errors import EndoscopeError
 from endoscope_lab.bench import keep_row
-from endoscope_lab.concealed.trial import differences, failed, rows_of
+from endoscope_lab.concealed.row import differences, rows_of
+from endoscope_lab.concealed.trial import failed
 
 ROW = replace(
     failed('sinusoid', 7, ValueError('a test')),

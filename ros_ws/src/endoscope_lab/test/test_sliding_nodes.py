@@ -7,7 +7,7 @@ from outside_data import CASES, needs
 from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
 
-from endoscope_lab.proof.sliding_nodes import (
+from endoscope_lab.concealed.sliding_nodes import (
     NOMINAL,
     follow,
     motor_angle,

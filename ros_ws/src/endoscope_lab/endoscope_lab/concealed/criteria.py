@@ -1,9 +1,9 @@
-"""`endoscope bench criteria`: derive the numbers by which explanations are judged."""
+"""The numbers by which explanations are judged, derived from cases whose truth is known."""
 
-import argparse
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from textwrap import fill
 
 import numpy as np
@@ -13,12 +13,11 @@ from scipy.optimize import minimize
 from endoscope_core.atomic_output import write_text
 from endoscope_core.errors import EndoscopeError
 from endoscope_explain.decide.decision import features, probability
-from endoscope_lab.concealed.trial import Row, rows_of
+from endoscope_lab.concealed.row import Row
 
 
-def run(args: argparse.Namespace) -> int:
-    """Print, and write if asked; return 0."""
-    rows = [row for file in args.rows for row in rows_of(file).values()]
+def derive(rows: Sequence[Row], write: Path | None) -> None:
+    """Print what the criteria of rows would do, and write them if asked; EndoscopeError if few."""
     bank = bank_of(rows)
     try:
         criteria = derived(bank)
@@ -26,15 +25,12 @@ def run(args: argparse.Namespace) -> int:
         raise EndoscopeError(str(error)) from error
     seeds = _in_words(sorted({row.seed for row in rows}))
     strata = ', '.join(dict.fromkeys(row.stratum for row in rows))
-    made_by = (
-        f'`endoscope bench criteria` from {len(rows)} cases of `endoscope bench concealed`, '
-        f'seeds {seeds} of {strata}'
-    )
+    cases = f'{len(rows)} cases, seeds {seeds} of {strata}'
+    made_by = f'`endoscope bench concealed --derive` from {cases}'
     print(sensitivity(bank, criteria))
     print('\n' + reliability(bank))
-    if args.write:
-        write_text(args.write, source(criteria, made_by))
-    return 0
+    if write:
+        write_text(write, source(criteria, made_by))
 
 
 def _in_words(seeds: list[int]) -> str:

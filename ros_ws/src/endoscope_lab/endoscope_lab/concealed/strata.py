@@ -20,6 +20,7 @@ from endoscope_lab.concealed.forms import (
     visited,
 )
 from endoscope_lab.concealed.judge import Case, Law, effects_at, law_at_place, law_of_effect
+from endoscope_lab.concealed.other_simulator import of_other_simulator
 from endoscope_lab.concealed.readings import Noise, Readings, read, record
 from endoscope_lab.concealed.rigs import (
     coarse_sensors,
@@ -27,7 +28,7 @@ from endoscope_lab.concealed.rigs import (
     other_sheath,
     true_rig,
 )
-from endoscope_lab.concealed.strength import drawn_as_strong
+from endoscope_lab.concealed.strength import AIM, drawn_as_strong
 
 Array = NDArray[np.float64]
 Generator = np.random.Generator
@@ -35,8 +36,6 @@ Added = Callable[[PlantDescription, float], PlantDescription]
 """Adds a law of some strength to a rig."""
 Motion = Callable[[Generator, int], Array]
 
-AIM = (0.1, 0.6)
-"""Share of the signal that a law moves of the channel that shows it most."""
 WEAKER = 0.1
 FORM_AIM = (0.02, 0.05)
 """The same of a form of the sheath that is no concealed law."""
@@ -165,12 +164,10 @@ def pairs(generator: Generator, seed: int) -> Case:
     return replace(case, laws=(law, other))
 
 
-def other_simulator(generator: Generator, seed: int) -> Case:
+def other_simulator(_: Generator, seed: int) -> Case:
     """A rig of `endoscope prove --form other`: sliding nodes, and laws of their own forms."""
-    from endoscope_lab.proof import OTHER
-    from endoscope_lab.proof.drawing import drawn
-
-    return replace(drawn(OTHER, seed, 0)[0], seed=seed)
+    generator = np.random.default_rng([seed, 0])
+    return replace(of_other_simulator(generator, None)[0], seed=seed)
 
 
 def as_strong(effect: str, seed: int, aims: tuple[float, float]) -> Case:

@@ -13,6 +13,8 @@ from endoscope_lab.concealed.rigs import spreads, with_number
 
 Array = NDArray[np.float64]
 
+AIM = (0.1, 0.6)
+"""Share of the signal that a law moves of the channel that shows it most."""
 CLOSE = 0.05
 """Relative error of the share that is reached."""
 _TRIES, _LAWS = 40, 30

@@ -9,6 +9,7 @@ from pathlib import Path
 from random import Random
 
 from endoscope_lab.bench import chosen, spread, table_head, table_row, today_and_machine
+from endoscope_lab.faults import motor_faults
 from endoscope_lab.faults.process_faults import (
     COMPOSED_FAULTS,
     PROCESS_FAULTS,
@@ -37,6 +38,8 @@ _SHARE = 1.001
 
 def run(args: argparse.Namespace) -> int:
     """Print a row for each fault; return 1 if something moved that was not asked to."""
+    if args.motors:
+        return motor_faults.run(args.only)
     faults = chosen('fault', args.only, COMPOSED_FAULTS if args.composed else PROCESS_FAULTS)
     print(
         f'{"one process" if args.composed else "a process for each node"}, {args.rate} Hz, seed '

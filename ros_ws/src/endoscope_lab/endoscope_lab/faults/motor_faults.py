@@ -1,11 +1,10 @@
-"""`endoscope bench motor_faults`: what the slave does when motors or master fail, and how fast."""
+"""What the slave does when motors or master fail, and how fast."""
 
-import argparse
 import math
 import re
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,9 +28,9 @@ _COLUMNS = (
 )
 
 
-def run(args: argparse.Namespace) -> int:
+def run(only: Sequence[str] | None) -> int:
     """Print a row for each fault; return 1 if one ended otherwise than it must."""
-    faults = chosen('fault', args.only, MOTOR_FAULTS)
+    faults = chosen('fault', only, MOTOR_FAULTS)
     wrong = 0
     print(table_head(*_COLUMNS))
     for fault in faults.values():

@@ -5,7 +5,7 @@ import importlib
 
 from endoscope_core.errors import InputError
 from endoscope_lab.bench import chosen, report
-from endoscope_lab.papers import classification, compensation
+from endoscope_lab.papers import calibrations, classification, compensation
 from endoscope_lab.papers.row import PapersBench, table_text
 
 FEWEST_CONFIGURATIONS = 5
@@ -26,11 +26,16 @@ TABLES = {
     'second, deg rms',
 }
 """Titles of the tables, in the order of printing; `papers` has a function `NAME_rows` for each."""
+OURS = {
+    'load_cells': 'Calibrations with load cells as they are',
+    'reading_rates': 'Calibrations with load cells that are read slowly',
+}
+"""Tables that no paper has, printed where they are asked for."""
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure and print; return 0 if every aim is kept, else 1."""
-    titles = chosen('table', args.only, TABLES)
+    titles = chosen('table', args.only, TABLES | OURS) if args.only else TABLES
     if args.tubes < FEWEST_CONFIGURATIONS:
         raise InputError(
             f'--tubes {args.tubes}: a row needs at least {FEWEST_CONFIGURATIONS} tube '
@@ -39,10 +44,15 @@ def run(args: argparse.Namespace) -> int:
     if 'classifiers' in titles:
         # Says now rather than after the other tables what it needs.
         importlib.import_module('endoscope_lab.papers.networks')
-    settings = PapersBench(args.seed, args.tubes, report)
+    settings = PapersBench(args.seed, args.tubes, report, args.motion, args.weights)
     missed = 0
     print(f'seed {settings.seed}, {settings.tubes} tube configurations a row', flush=True)
     for name, title in titles.items():
+        if name in OURS:
+            print(f'\n{title}', flush=True)
+            for line in getattr(calibrations, f'{name}_text')(settings):
+                print(line, flush=True)
+            continue
         room = compensation if hasattr(compensation, f'{name}_rows') else classification
         rows = getattr(room, f'{name}_rows')(settings)
         missed += sum(row.reached is False for row in rows)

@@ -2,8 +2,11 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+
+from endoscope_core.signals import SINUSOID
 
 
 @dataclass(frozen=True)
@@ -13,6 +16,8 @@ class PapersBench:
     seed: int  # chooses tubes, rigs and noise
     tubes: int  # tube configurations for each row, at least five
     report: Callable[[str], None]  # takes a line that says how far it has come
+    motion: str = SINUSOID  # of a calibration, in the tables of load cells
+    weights: Path | None = None  # of the classifier there; None for the shipped ones
 
 
 @dataclass(frozen=True)

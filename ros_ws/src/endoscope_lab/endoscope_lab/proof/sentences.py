@@ -8,7 +8,7 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_explain.report.numbers import digits
 from endoscope_lab.concealed.judge import Statement
-from endoscope_lab.concealed.trial import GOOD
+from endoscope_lab.concealed.row import GOOD
 from endoscope_lab.proof.trial import Outcome
 
 

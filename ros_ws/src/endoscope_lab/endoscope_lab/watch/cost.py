@@ -1,6 +1,5 @@
-"""`endoscope bench watched`: what watching the rig costs the graph at 1 kHz."""
+"""What watching the rig costs the graph at 1 kHz."""
 
-import argparse
 import os
 import tempfile
 from pathlib import Path
@@ -12,21 +11,20 @@ from endoscope_lab.graph import Composition, Pace, least_cores
 from endoscope_nodes.graph import ALL_NODES
 
 TARGET_CORES = 0.1
+_ROUNDS, _SECONDS = 2, 10.0
 _LEARNT_S = 45.0
 """Of motion, after which every block is judged."""
 
 
-def run(args: argparse.Namespace) -> int:
+def run() -> int:
     """Print the figures; return 1 if watching costs more than it may."""
     cores: dict[bool, list[float]] = {False: [], True: []}
     # In turn, so that what else the machine does spoils both alike.
-    for _ in range(args.rounds):
+    for _ in range(_ROUNDS):
         for watched, costs in cores.items():
-            costs.append(_in_lock_step(watched, args.seconds))
+            costs.append(_in_lock_step(watched, _SECONDS))
         for watched in cores:
-            print(
-                f'{"watched" if watched else "not watched"}: {_in_real_time(watched, args.seconds)}'
-            )
+            print(f'{"watched" if watched else "not watched"}: {_in_real_time(watched, _SECONDS)}')
     without, with_it = min(cores[False]), min(cores[True])
     print(
         f'{100 * without:.1f} % of a core without, {100 * with_it:.1f} % with it: watching costs '

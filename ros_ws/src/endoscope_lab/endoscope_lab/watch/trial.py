@@ -20,6 +20,7 @@ from endoscope_lab.bench import (
     table_head,
     table_row,
 )
+from endoscope_lab.watch import cost
 from endoscope_lab.watch.changing_rig import KINDS, SEGMENT_S, Watched, watched
 
 _PER_HOUR = 0.1
@@ -29,6 +30,8 @@ _HOURS = SEGMENT_S / 3600.0
 
 def run(args: argparse.Namespace) -> int:
     """Print a table, or the thresholds; return 0."""
+    if args.cost:
+        return cost.run()
     # Nothing is told where thresholds are derived, so that each rig is judged to its end.
     thresholds = dict.fromkeys(map(str, Part), math.inf) if args.derive else THRESHOLDS
     kinds = () if args.derive else tuple(chosen('change', args.only, KINDS))

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from endoscope_core.physics import JointParameters
+from endoscope_lab.concealed import sliding_nodes
 from endoscope_lab.concealed.readings import TRACKER_TICKS, Readings
-from endoscope_lab.proof import sliding_nodes
-from endoscope_lab.proof.sliding_nodes import Acting
+from endoscope_lab.concealed.sliding_nodes import Acting
 
 Array = NDArray[np.float64]
 Generator = np.random.Generator

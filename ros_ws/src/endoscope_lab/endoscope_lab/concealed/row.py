@@ -1,0 +1,147 @@
+"""A case of the benchmark as a row: what was concealed, what was said, how far it is right."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import isclose
+from pathlib import Path
+
+import numpy as np
+
+from endoscope_lab.bench import kept_rows, table_head, table_row
+from endoscope_lab.concealed.judge import Judgement
+
+GOOD = 1.3
+"""Rmse over noise up to which a second recording is predicted."""
+COLUMNS = (
+    *('stratum', 'cases', 'told apart', 'named first of these', 'of all', 'right place'),
+    *('exact set', 'false names', 'in set', 'names a set', 'intervals', 'described', 'refitted'),
+    *('improved', '80th', 's, median', '95th'),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row(Judgement):
+    """What was concealed, what was said, and how far it is right."""
+
+    stratum: str
+    seed: int
+    concealed: tuple[str, ...]  # laws with their joints
+    note: str  # what is particular to the case
+    moved: float  # what the laws change, over the signal
+    left: float  # what a refit of the rig's numbers leaves of them, over noise
+    verdict: str
+    said: tuple[str, ...]  # names with their joints, most certain first
+    # Intervals that hold the true number, of how many: those of the plant, and of the numbers of
+    # named effects that could be measured another way.
+    held: int = 0
+    intervals: int = 0
+    # Misfit of the second recording over noise, of the worst signal.
+    nominal: float = math.nan
+    refitted: float = math.nan
+    augmented: float = math.nan
+    seconds: float = math.nan  # that explaining took
+    # What is left over what rigs of another form leave, of the worst joint.
+    beyond_form: float = math.nan
+    # Error of each number over what its interval would allow on that side with an `INTERVAL_WIDTH`
+    # of one.
+    errors: tuple[float, ...] = ()
+    # Evidence of each named effect, with how many rivals it has, and whether it is right.
+    evidence: tuple[dict[str, float], ...] = ()
+    # The laws that are told from other numbers, and whether the first statements name these.
+    told: tuple[str, ...] = ()
+    first_of_told: bool = True
+
+    @property
+    def is_told_apart(self) -> bool:
+        """Whether laws, if any, are told from other numbers and a second recording misses them."""
+        return not self.concealed or (bool(self.told) and not self.refitted <= GOOD)
+
+    def line(self) -> str:
+        right = 'right' if self.exact else 'first' if self.first else 'place' if self.place else ''
+        ratios = ' > '.join(f'{x:.3g}' for x in (self.nominal, self.refitted, self.augmented))
+        note = f' [{self.note}]' if self.note else ''
+        return (
+            f'{self.stratum:17s}{self.seed:4d}  {right or "WRONG":6s}{self.seconds:6.1f} s  '
+            f'{" + ".join(self.concealed) or "nothing"}{note}, moves {100.0 * self.moved:.0f} %, '
+            f'a refit leaves {self.left:.2g}: '
+            f'{self.verdict}, {" + ".join(self.said) or "nothing"}; second {ratios}'
+        )
+
+
+def table(rows: Sequence[Row]) -> str:
+    """A line for each stratum, and one for all."""
+    strata = dict.fromkeys(row.stratum for row in rows)
+    lines = {f'`{name}`': [row for row in rows if row.stratum == name] for name in strata}
+    lines['all'] = list(rows)
+    shown = (table_row(name, *_cells(of_it)) for name, of_it in lines.items())
+    return '\n'.join([table_head(*COLUMNS), *shown])
+
+
+def _cells(rows: Sequence[Row]) -> tuple[str, ...]:
+    def share(name: str, of: Sequence[Row] = rows) -> str:
+        return f'{100.0 * np.mean([getattr(row, name) for row in of]):.0f} %' if of else '-'
+
+    def second(name: str, quantile: float = 0.5) -> str:
+        values = np.array([getattr(row, name) for row in rows])
+        # What failed predicts nothing.
+        values[np.isnan(values)] = np.inf
+        return f'{np.quantile(values, quantile):.3g}'
+
+    apart = [row for row in rows if row.is_told_apart]
+    intervals = sum(row.intervals for row in rows)
+    held = f'{100.0 * sum(row.held for row in rows) / intervals:.0f} %' if intervals else '-'
+    seconds = [row.seconds for row in rows if not np.isnan(row.seconds)] or [math.nan]
+    sizes = [row.set_size for row in rows if not np.isnan(row.set_size)] or [math.nan]
+    return (
+        str(len(rows)),
+        str(len(apart)),
+        share('first_of_told', apart),
+        share('first'),
+        share('place'),
+        share('exact'),
+        str(sum(row.false for row in rows)),
+        share('in_set'),
+        f'{np.mean(sizes):.1f}',
+        held,
+        second('nominal'),
+        second('refitted'),
+        second('augmented'),
+        second('augmented', 0.8),
+        f'{np.median(seconds):.1f}',
+        f'{np.quantile(seconds, 0.95):.1f}',
+    )
+
+
+CaseKey = tuple[str, int]
+"""Stratum and seed."""
+
+SAME = 0.02
+"""Relative difference of a misfit that two machines may have: fits end within a thousandth of their
+cost, in which a misfit of twice the noise has a share of a hundredth."""
+
+
+def rows_of(file: Path) -> dict[CaseKey, Row]:
+    """Read a record; EndoscopeError for a line that is none of a row."""
+    return {(row.stratum, row.seed): row for row in kept_rows(file, Row)}
+
+
+def differences(before: Row, now: Row) -> Iterator[str]:
+    """In what an explanation differs from the one on record: verdict, names, misfits, numbers."""
+    for name in ('verdict', 'said'):
+        was, is_ = getattr(before, name), getattr(now, name)
+        if was != is_:
+            yield f'{name} {_shown(was)} -> {_shown(is_)}'
+    for name in ('nominal', 'refitted', 'augmented'):
+        was, is_ = getattr(before, name), getattr(now, name)
+        if not isclose(was, is_, rel_tol=SAME):
+            yield f'second recording, {name}: {was:.3g} -> {is_:.3g}'
+    if before.held != now.held or before.intervals != now.intervals:
+        yield (
+            f'intervals that hold: {before.held} of {before.intervals} -> '
+            f'{now.held} of {now.intervals}'
+        )
+
+
+def _shown(value: str | tuple[str, ...]) -> str:
+    return value if isinstance(value, str) else ' + '.join(value) or 'nothing'
