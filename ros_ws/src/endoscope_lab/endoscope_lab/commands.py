@@ -85,6 +85,7 @@ BENCHES: dict[str, Bench] = {
             _seconds(60.0, 'length of the run in one process, and of one of --recorder'),
             _seconds(10.0, 'length of each run in many processes, 0 for none', '--process-seconds'),
             _flag('--recorder', 'what the recorder takes without loss, and its CPU time'),
+            _seconds(0.0, 'instead, let participants come and go for so long at 1 kHz', '--soak'),
         ),
     ),
     'console': Bench(

@@ -1,6 +1,8 @@
 """`endoscope bench graph`: whether the node graph keeps its pace, in one process and in many."""
 
 import argparse
+import faulthandler
+import multiprocessing
 import os
 import tempfile
 import time
@@ -8,12 +10,15 @@ from collections import Counter, deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
+from rclpy.qos import qos_profile_sensor_data
 from rclpy.task import Future
+from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from endoscope_core.errors import EndoscopeError
@@ -24,10 +29,17 @@ from endoscope_lab.bench import cpu_seconds, spread
 from endoscope_lab.faults.node_processes import NODES, NodeProcesses
 from endoscope_lab.faults.operator import Operator
 from endoscope_nodes.graph import ALL_NODES
-from endoscope_nodes.names import CLOCK_NODE, STATE_COMMAND
+from endoscope_nodes.names import (
+    CLOCK_NODE,
+    MOTOR_MEASURED,
+    OPERATING_STATE,
+    STATE_COMMAND,
+    WIRES_MEASURED,
+)
 from endoscope_nodes.nodes.simulation_clock import SimulationClockNode
+from endoscope_nodes.runtime.environment import joined_node
 from endoscope_nodes.runtime.private_domain import private_domain, process_domain
-from endoscope_nodes.runtime.qos import EVENT
+from endoscope_nodes.runtime.qos import EVENT, RESULT
 from endoscope_nodes.runtime.runtime import Runtime
 
 PROCESS_RATES = (1000, 500, 250, 125)
@@ -37,6 +49,8 @@ def run(args: argparse.Namespace) -> int:
     """Print the figures; return 1 if a target is missed."""
     if args.recorder:
         return recorder.run(args.seconds)
+    if args.soak:
+        return 0 if outlives_visitors(args.soak) else 1
     reached = composed_graph_is_carried(args.seconds)
     speed = lock_step_speed(min(args.seconds, 20.0))
     print(f'lock-step: {speed:.1f} times real time', flush=True)
@@ -53,6 +67,7 @@ _SETTLING_S = 2.0
 # Before the queue of a thousand commands is full.
 _MOVING_S = 0.5
 SIMULATED = ('--ros-args', '-p', 'use_sim_time:=true')
+_VISIT_S = 0.1
 _PLAYING = {'source': 'motion', 'motion': 'periodic'}
 
 
@@ -76,6 +91,49 @@ def composed_graph_is_carried(seconds: float) -> bool:
         and pace.cores < TARGET_CORES
     )
     return kept and report.lost_count == 0 and state == OperatingState.ENABLED
+
+
+def outlives_visitors(seconds: float) -> bool:
+    """Let participants come and go for so long beside all nodes here at 1 kHz.
+
+    A graph that does not go on prints where its threads are, and ends the process.
+    """
+    context = multiprocessing.get_context('spawn')
+    visits = context.Value('i')
+    with _recorded() as overrides, Composition(ALL_NODES, overrides) as graph:
+        visitor = context.Process(target=_visit, args=(process_domain(), visits), daemon=True)
+        visitor.start()
+        try:
+            graph.enable()
+            ticks = graph.runtime.ticker.ticks
+            end = time.monotonic() + seconds
+            while (left := end - time.monotonic()) > 0.0:
+                faulthandler.dump_traceback_later(graph.STUCK_S, exit=True)
+                graph.serve(min(left, _SETTLING_S))
+            ticks = graph.runtime.ticker.ticks - ticks
+            state = graph.situation
+        finally:
+            faulthandler.cancel_dump_traceback_later()
+            visitor.terminate()
+            visitor.join()
+    print(
+        f'{seconds:.0f} s at 1 kHz while {visits.value} participants came and went: {ticks} beats, '
+        f'{state} at the end',
+        flush=True,
+    )
+    return ticks > 0 and visits.value > 0
+
+
+def _visit(domain: int, visits: Synchronized) -> None:
+    """Join and leave without end, with topics whose QoS does not match the graph's."""
+    while True:
+        with joined_node('visitor', 'endoscope', domain) as node:
+            for topic in (STATE_COMMAND, OPERATING_STATE):
+                node.create_publisher(String, topic, qos_profile_sensor_data)
+            for topic, qos in ((MOTOR_MEASURED, RESULT), (WIRES_MEASURED, EVENT)):
+                node.create_subscription(JointState, topic, print, qos)
+            time.sleep(_VISIT_S)
+        visits.value += 1
 
 
 def lock_step_speed(seconds: float) -> float:
@@ -145,6 +203,7 @@ class Composition(ClosedOnExit):
     """Nodes in this process with a context and a domain of their own."""
 
     _PATIENCE_S = 60.0
+    STUCK_S = 120.0
 
     def __init__(
         self,
