@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 from commanded_graph import Handle
 from node_program import code_of
@@ -14,11 +15,12 @@ from rclpy.node import Node
 from simulated_graph import SimulatedGraph
 
 from endoscope_bringup.operating.status import status_of
+from endoscope_core.rig import load_rig
 from endoscope_nodes.client.graph_client import joined_graph
 from endoscope_nodes.client.graph_listener import LOCK_STEP
 from endoscope_nodes.client.graph_parameters import set_parameters
 from endoscope_nodes.graph import compose
-from endoscope_nodes.names import FACTOR
+from endoscope_nodes.names import FACTOR, GEAR
 from endoscope_nodes.runtime.private_domain import private_domain
 from endoscope_nodes.runtime.runtime import Runtime
 
@@ -74,6 +76,20 @@ def test_the_factor_is_told(running):
     [line] = [line for line in lines if line.startswith('time')]
     assert line.startswith('time         simulated, at ')
     assert float(client.health[LOCK_STEP].values[FACTOR]) == values['time'][FACTOR]
+    at = next(k for k, line in enumerate(lines) if line.startswith('rig'))
+    assert lines[at].startswith('rig          simulated (endoscope ')
+    joints = load_rig(None).joints
+    assert f'gear {joints.gear:g}, joints to {np.degrees(joints.reach):.0f} deg' in lines[at + 1]
+    assert values['rig'][GEAR] == joints.gear
+
+
+def test_what_was_not_heard_is_told_as_that_and_never_as_a_default():
+    with joined_graph('tester', 'endoscope', private_domain()) as client:
+        lines, values = status_of(client, 0.0)
+    assert all('not heard' in line for line in lines if not line.startswith('state '))
+    assert 'what forbids motion not heard' in lines[0]
+    assert values['time'] == {'simulated': None, FACTOR: None}
+    assert values['rig'] == {'kind': None}
 
 
 def test_cells_that_fall_silent_are_a_fault_and_do_not_stop_time(running):

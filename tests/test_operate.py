@@ -247,7 +247,7 @@ def test_status_names_every_node_and_the_source_of_the_master(graph):
     said = json.loads(graph.run('operate', 'status', '--json')[1])
     assert said['state'] == 'DISABLED'
     assert said['console_source'] == 'none'
-    assert said['silent'] == []
+    assert said['not_heard'] == []
     assert set(said['nodes']) >= {'supervisor: operating state', 'calibration: procedure'}
 
 

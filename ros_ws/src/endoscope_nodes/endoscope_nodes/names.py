@@ -55,6 +55,14 @@ FACTOR = 'real-time factor'
 # :class:`endoscope_core.safety.Answer` and in words, and when; and which streams never came.
 REFUSAL, REFUSAL_CODE, REFUSED_NS = 'last refusal', 'refusal code', 'refused at [ns]'
 AWAITED = 'awaited'
+# And by what it runs: simulated or real time, gear, largest bending, its speed, and tension.
+TIME, GEAR, REACH, SPEED, CEILING = (
+    'time',
+    'gear',
+    'joint reach [rad]',
+    'joint speed [rad/s]',
+    'tension ceiling [N]',
+)
 # What `recorder: events` says there: how many marks it has heard, and its last bag of an event.
 MARKS, LAST_EVENT = 'marks', 'last bag'
 # What `recorder: recording` says there while it records: where, and whether nobody asked for it.

@@ -5,23 +5,50 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any
 
+from rclpy.serialization import deserialize_message
+from std_msgs.msg import String
+
+from endoscope_core.rig import kind_from_text
 from endoscope_nodes.client.graph_client import GraphClient
-from endoscope_nodes.client.graph_listener import LOCK_STEP, MASTER, RECORDER, Health
-from endoscope_nodes.names import BAG, CLOCK_NODE, FACTOR, JOINTS
+from endoscope_nodes.client.graph_listener import (
+    LOCK_STEP,
+    MASTER,
+    RECORDER,
+    SUPERVISOR,
+    Health,
+)
+from endoscope_nodes.names import (
+    BAG,
+    CEILING,
+    FACTOR,
+    GEAR,
+    JOINTS,
+    REACH,
+    RIG_KIND,
+    SPEED,
+    TIME,
+)
 from endoscope_nodes.program import NODES
 
 _LEVELS = ('ok', 'WARN', 'ERROR', 'STALE')
 _FULL_ROUND_S = 1.1
-# These say nothing on /diagnostics.
-_QUIET = (CLOCK_NODE, 'replay')
+# It says nothing on /diagnostics.
+_QUIET = ('replay',)
+_NOT_HEARD = 'not heard'
 
 
 def status_of(client: GraphClient, patience_s: float) -> tuple[tuple[str, ...], dict[str, Any]]:
     """Listen until every node has spoken, at most for so many seconds; what they say."""
+    kinds: list[str] = []
+
+    def note(data: bytes, _: int) -> None:
+        kinds.append(str(kind_from_text(deserialize_message(data, String).data)))
+
+    client.listen(String, RIG_KIND, note, latched=True)
     # Nodes speak once a second; those that are found last would be missed otherwise.
     client.wait_until(lambda: False, _FULL_ROUND_S)
-    client.wait_until(lambda: not _silent(client), patience_s)
-    health, silent = client.health, _silent(client)
+    client.wait_until(lambda: not _not_heard(client), patience_s)
+    health, not_heard = client.health, _not_heard(client)
     master, recorder = health.get(MASTER), health.get(RECORDER)
     source = '' if master is None else master.values.get('source', '')
     bag = '' if recorder is None else recorder.values.get(BAG, '')
@@ -29,12 +56,13 @@ def status_of(client: GraphClient, patience_s: float) -> tuple[tuple[str, ...], 
         'state': client.state,
         'why': client.why,
         'session': client.session,
-        'time': {'simulated': LOCK_STEP in health, FACTOR: client.factor},
+        'time': {'simulated': _is_simulated(health), FACTOR: client.factor},
+        'rig': {'kind': kinds[-1] if kinds else None, **_in_force(health)},
         'nodes': {
             name: {'level': _LEVELS[said.level], 'message': said.message, 'values': said.values}
             for name, said in sorted(health.items())
         },
-        'silent': silent,
+        'not_heard': not_heard,
         'compensator': _of_json(client.compensator),
         'calibration': _of_json(client.calibration),
         'recorder': {'bag': bag, 'message': recorder.message if recorder else ''},
@@ -42,18 +70,24 @@ def status_of(client: GraphClient, patience_s: float) -> tuple[tuple[str, ...], 
     }
     lines = (
         *_entry('state', [_state(client)]),
-        *_entry('session', [client.session or 'none']),
-        *_entry('time', [_time(health.get(LOCK_STEP))]),
+        *_entry('session', [(client.session or 'none') if client.graph_ns else _NOT_HEARD]),
+        *_entry('time', [_time(health)]),
+        *_entry('rig', [kinds[-1] if kinds else _NOT_HEARD, *_limits(health)]),
         *_entry('console', [_master(source, master)]),
-        *_entry('compensator', [client.compensator.message if client.compensator else 'silent']),
-        *_entry('calibration', calibration_in_words(client.calibration)),
+        *_entry('compensator', [client.compensator.message if client.compensator else _NOT_HEARD]),
+        *_entry(
+            'calibration',
+            calibration_in_words(client.calibration)
+            if client.calibration or client.orders
+            else [_NOT_HEARD],
+        ),
         *_entry('recorder', [_recorder(recorder)]),
-        *_entry('nodes', (*_nodes(health), *(f'{name:<13} silent' for name in silent))),
+        *_entry('nodes', (*_nodes(health), *(f'{name:<13} {_NOT_HEARD}' for name in not_heard))),
     )
     return lines, values
 
 
-def _silent(client: GraphClient) -> list[str]:
+def _not_heard(client: GraphClient) -> list[str]:
     return [
         name
         for name in client.nodes()
@@ -70,6 +104,8 @@ def _entry(title: str, lines: Iterable[str]) -> list[str]:
 
 
 def _state(client: GraphClient) -> str:
+    if SUPERVISOR not in client.health:
+        return f'{client.state}; what forbids motion {_NOT_HEARD}'
     if client.why:
         forbidden = 'cannot be enabled: ' if client.state in ('DISABLED', 'PAUSED') else ''
         return f'{client.state}: {forbidden}{client.why}'
@@ -77,19 +113,49 @@ def _state(client: GraphClient) -> str:
     return client.state + (f'; `endoscope operate {todo}` lets it move' if todo else '')
 
 
-def _time(said: Health | None) -> str:
-    return 'real' if said is None else f'simulated, {said.message}'
+def _is_simulated(health: dict[str, Health]) -> bool | None:
+    """Whether time is; None where nobody has said so."""
+    if LOCK_STEP in health:
+        return True
+    said = health.get(SUPERVISOR)
+    return None if said is None else said.values[TIME] == 'simulated'
+
+
+def _time(health: dict[str, Health]) -> str:
+    if LOCK_STEP in health:
+        return f'simulated, {health[LOCK_STEP].message}'
+    return {True: f'simulated, its pace {_NOT_HEARD}', False: 'real', None: _NOT_HEARD}[
+        _is_simulated(health)
+    ]
+
+
+def _in_force(health: dict[str, Health]) -> dict[str, float]:
+    """Gear and limits by which the supervisor runs; empty before it is heard."""
+    said = health.get(SUPERVISOR)
+    found = (GEAR, REACH, SPEED, CEILING) if said is not None else ()
+    return {name: float(said.values[name]) for name in found if said is not None}
+
+
+def _limits(health: dict[str, Health]) -> list[str]:
+    limits = _in_force(health)
+    if not limits:
+        return [f'gear and limits {_NOT_HEARD}']
+    words = (
+        f'gear {limits[GEAR]:g}, joints to {math.degrees(limits[REACH]):.0f} deg at up to '
+        f'{math.degrees(limits[SPEED]):.0f} deg/s, wires to {limits[CEILING]:g} N'
+    )
+    return [words]
 
 
 def _master(source: str, said: Health | None) -> str:
     if said is None:
-        return 'silent'
+        return _NOT_HEARD
     return f'source {source}' + (f': {said.message}' if said.message != source else '')
 
 
 def _recorder(said: Health | None) -> str:
     if said is None:
-        return 'silent'
+        return _NOT_HEARD
     if not said.values.get(BAG):
         return said.message
     counts = f'{said.values["messages"]} messages, {said.values["lost"]} lost'

@@ -35,6 +35,13 @@ class SupervisorNode(EndoscopeNode):
         self._timeout_ns = self.rig.timeouts.stream_ns
         self.machine = OperatingStateMachine()
         self._guard = TensionGuard(names.WIRES, self.rig.tension.ceiling)
+        joints = self.rig.joints
+        self._in_force = {
+            names.GEAR: joints.gear,
+            names.REACH: joints.reach,
+            names.SPEED: joints.speed,
+            names.CEILING: self.rig.tension.ceiling,
+        }
         self._refused, self._refused_ns = Answer(True), 0
         self._own = f'{self.get_namespace().rstrip("/")}/'
         self._watched = [self.resolve_topic_name(t.name) for t in TOPICS if t.one_sender]
@@ -133,6 +140,8 @@ class SupervisorNode(EndoscopeNode):
             names.REFUSAL_CODE: self._refused.code,
             names.REFUSED_NS: self._refused_ns,
             'peak tension [N]': self._guard.peak,
+            names.TIME: 'simulated' if self.ticker.simulated else 'real',
+            **self._in_force,
         }
         if machine.state is OperatingState.FAULT:
             return ERROR, machine.cause, values
