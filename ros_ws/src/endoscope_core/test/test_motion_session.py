@@ -430,7 +430,7 @@ def test_a_rival_whose_command_waits_for_a_stalled_driver_ends_its_session():
 
 
 TestAnyInterleaving = AnyInterleaving.TestCase
-TestAnyInterleaving.settings = settings(max_examples=100, stateful_step_count=20, deadline=None)
+TestAnyInterleaving.settings = settings(max_examples=40, stateful_step_count=20, deadline=None)
 
 
 def test_refusals_are_counted_by_reason():

@@ -8,8 +8,6 @@ from patient_clients import PATIENCE_S, opened
 from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
 from endoscope_emulators.dynamixel.process import EmulatorProcess
 
-pytestmark = pytest.mark.nightly
-
 MOUNTS = (ServoMount('motor_x', 1), ServoMount('motor_y', 2))
 FASTEST = 4.9
 
@@ -85,12 +83,14 @@ def rig(tmp_path):
     rig.close()
 
 
+@pytest.mark.nightly
 def test_flipped_bits_make_no_wrong_reading(rig):
     rig.emulator.do('damage_rate', 0.03)
     rig.swing_until(lambda: sum(rig.bus.figures.failures.values()) > 10 and len(rig.readings) > 300)
     rig.check_readings()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize('late', [0.006, 0.05])
 def test_late_answers_are_not_taken_for_those_of_the_next_request(rig, late):
     rig.emulator.do('delay_s', late)
@@ -102,6 +102,7 @@ def test_late_answers_are_not_taken_for_those_of_the_next_request(rig, late):
     rig.check_readings()
 
 
+@pytest.mark.nightly
 def test_repeated_answers_change_nothing(rig):
     rig.emulator.do('repeated', 400)
     rig.swing_until(lambda: len(rig.readings) > 300)
@@ -133,16 +134,6 @@ def test_a_servo_that_is_cut_off_disarms_and_comes_back_without_moving(rig):
     rig.check_readings()
 
 
-def test_an_adapter_that_is_pulled_out_is_opened_again(rig):
-    rig.emulator.do('hang_up')
-    rig.swing_until(lambda: 'there is no such port' in rig.motors.trouble())
-    rig.emulator.do('plug_in')
-    before = rig.bus.figures.readings
-    rig.swing_until(lambda: rig.bus.figures.readings > before + 100)
-    assert not rig.bus.armed
-    rig.arm()
-
-
 def test_an_order_given_while_the_bus_is_away_is_not_carried_out_later(rig):
     rig.emulator.do('hang_up')
     rig.swing_until(lambda: 'there is no such port' in rig.motors.trouble())
@@ -152,6 +143,7 @@ def test_an_order_given_while_the_bus_is_away_is_not_carried_out_later(rig):
     rig.swing_until(lambda: rig.bus.figures.readings > before + 200)
     assert not rig.bus.armed
     assert rig.emulator.state(1)['torque'] == 0
+    rig.arm()
 
 
 def test_a_servo_that_loses_power_gives_no_false_zero(rig):
@@ -167,6 +159,7 @@ def test_a_servo_that_loses_power_gives_no_false_zero(rig):
     rig.check_readings()
 
 
+@pytest.mark.nightly
 def test_an_overload_is_named_and_ends_only_with_a_restart(rig):
     rig.emulator.do('overload', 1)
     rig.swing_until(lambda: 'servo 1 reports overload' in rig.motors.trouble())
@@ -182,6 +175,7 @@ def test_an_overload_is_named_and_ends_only_with_a_restart(rig):
     rig.arm()
 
 
+@pytest.mark.nightly
 def test_a_brown_out_is_named(rig):
     rig.emulator.do('supply', 1, 9.0)
     rig.swing_until(lambda: 'servo 1 reports input voltage' in rig.motors.trouble())
@@ -203,6 +197,7 @@ def test_a_node_that_no_longer_renews_its_goal_is_noticed(rig):
     assert rig.emulator.state(1)['torque'] == 1
 
 
+@pytest.mark.nightly
 def test_the_current_limit_of_the_firmware_stops_a_shaft(tmp_path):
     with EmulatorProcess(stiffness=2.0) as emulator:
         motors = opened(BusSettings(emulator.port, current_limit=0.3), MOUNTS)
