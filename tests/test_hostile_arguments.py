@@ -37,13 +37,12 @@ topics: {slave/measured_js: {position: {bend_x: {column: angle, unit: rad}}}}
 WRITING = (
     'simulate --plant plant.yaml --commands bag --out',
     'explain bag --plant plant.yaml --quick --out',
-    'invert --plant plant.yaml --motion periodic --out',
     'convert table.csv --mapping mapping.yaml --out',
     'convert table.csv --propose',
     'bag cut bag --out',
     'bag recover bag',
     'dataset --n 7 --out',
-    'identify bag --model play --out',
+    'identify bag --model dahl --out',
 )
 READING = (
     'explain bag --plant plant.yaml --quick --out out --baseline',

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from endoscope_core.control.iterated_inverse import iterated_inverse
 from endoscope_core.physics import (
     EffectSpec,
     JointParameters,
@@ -322,18 +321,6 @@ def test_places_name_their_hooks_and_are_no_effects():
     assert {place.hook for place in FUNCTIONS.values()} <= set(HOOKS)
     flags = [each.flag for each in (*FUNCTIONS.values(), *CATALOGUE.values())]
     assert len(set(flags)) == len(flags)
-
-
-def test_a_plant_with_a_function_is_inverted():
-    time = TICK * np.arange(2000)
-    desired = 0.4 * np.sin(2.0 * time)[:, None] * [1.0, 0.0]
-    velocity = 0.8 * np.cos(2.0 * time)[:, None] * [1.0, 0.0]
-    plant = PlantDescription(terms=(shown('load_of_angle', 3.0),))
-    unaware = iterated_inverse(PlantDescription(), desired, velocity, 15)
-    planned = iterated_inverse(plant, desired, velocity, 15)
-    shaft = 0.5 * unaware.command
-    missed = simulate(plant, shaft).bending_true - desired
-    assert planned.rmse < 0.5 * np.sqrt(np.mean(missed**2))
 
 
 def test_effects_name_families_that_there_are_of_their_own_stage():

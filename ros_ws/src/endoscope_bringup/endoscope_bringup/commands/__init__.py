@@ -10,7 +10,6 @@ COMMANDS: tuple[str, ...] = (
     'simulate',
     'explain',
     'investigate',
-    'invert',
     'convert',
     'operate',
     'topics',

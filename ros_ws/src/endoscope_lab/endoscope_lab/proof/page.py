@@ -63,9 +63,9 @@ def _followed(outcome: Outcome) -> str:
     return _with_errors(
         f'{JOINTS[j]} (deg)',
         replace(wanted, label='desired'),
-        {name: (run.time, np.degrees(run.measured[:, j])) for name, run in runs.items()},
+        {name: (run.time, np.degrees(run.tip[:, j])) for name, run in runs.items()},
         'measured - desired (deg)',
-        {name: np.degrees(run.measured - run.desired)[:, j] for name, run in runs.items()},
+        {name: np.degrees(run.tip - run.desired)[:, j] for name, run in runs.items()},
     )
 
 

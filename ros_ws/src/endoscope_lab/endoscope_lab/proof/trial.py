@@ -18,6 +18,7 @@ from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import load_plant
 from endoscope_core.physics.plant_file import plant_from_mapping, save_plant
 from endoscope_explain.case import ExplainedCase
+from endoscope_explain.investigation.tracking import Tracked
 from endoscope_explain.observe.predicted_signals import view
 from endoscope_explain.pipeline import Sources, explain_case, read_inputs
 from endoscope_explain.recording import (
@@ -157,9 +158,9 @@ class Outcome:
     answer: Answer
     truth: dict  # as it was sealed
     judgement: Judgement
-    # How the slave follows a motion that is planned with the plant as described, and as improved;
+    # How the slave follows a motion by the inverse of the plant as described, and as improved;
     # empty of a rig that does not run.
-    tracking: dict[str, slave.Tracking] = field(default_factory=dict)
+    tracking: dict[str, Tracked] = field(default_factory=dict)
 
 
 def recorded(form: str, seed: int, number: int, effect: str | None, folder: Path) -> Rig:
@@ -218,7 +219,7 @@ def compared(rig: Rig, answer: Answer) -> Outcome:
     return Outcome(rig, answer, truth, judged(rig.laws, answer.said, rig.also))
 
 
-def followed(folder: Path, truth: dict, seed: int) -> dict[str, slave.Tracking]:
+def followed(folder: Path, truth: dict, seed: int) -> dict[str, Tracked]:
     """Move a slave by the inverse of its plant as described, and as improved."""
     keys = ('joints', 'sensors', 'effects')
     true = plant_from_mapping({key: truth[key] for key in keys})
