@@ -39,7 +39,3 @@ def test_what_the_calibration_did_not_find_is_not_guessed():
         graph.set('compensator', mode='physical', selected_by='plant')
         graph.advance(0.3)
         assert graph.nodes['compensator']._feedforward.law.mode == 'none'
-        graph.set('controller', law='recursive_least_squares')
-        graph.set('console', source='motion')
-        graph.advance(1.2)
-        assert graph.reported('controller: feedback')['law'] == 'recursive_least_squares'

@@ -58,15 +58,15 @@ def test_the_plant_is_identified_from_a_bag(bag, capsys):
 
 def test_each_calibration_extends_the_table(bag, tmp_path, capsys):
     table = tmp_path / 'table.json'
-    source = ['identify', str(bag), '--model', 'play', '--table', str(table)]
+    source = ['identify', str(bag), '--model', 'dahl', '--table', str(table)]
     assert main(source) == 0
     assert main(source) == 0
     assert '1 entries' in capsys.readouterr().err
     entries = UpdatedTable.load(table).entries
     assert len(entries) == 1
     assert np.rad2deg(entries[0].size) == pytest.approx(74.0, abs=4.0)
-    assert main(['identify', str(bag), '--model', 'dahl', '--table', str(table)]) == 2
-    assert 'is a table of play' in capsys.readouterr().err
+    assert main(['identify', str(bag), '--model', 'bouc_wen', '--table', str(table)]) == 2
+    assert 'is a table of dahl' in capsys.readouterr().err
 
 
 def test_a_table_holds_no_plants(bag, tmp_path, capsys):
@@ -80,9 +80,9 @@ def test_a_table_holds_no_plants(bag, tmp_path, capsys):
     [
         (['family', 'FOLDER'], 'no recordings of tubes'),
         (['somewhere', 'FOLDER'], 'identify family FOLDER'),
-        (['family', 'FOLDER', '--model', 'play'], 'no model'),
+        (['family', 'FOLDER', '--model', 'dahl'], 'no model'),
         (['FOLDER'], 'no --model'),
-        (['FOLDER', '--model', 'play', '--output', 'x.yaml'], '--output and --figure'),
+        (['FOLDER', '--model', 'dahl', '--output', 'x.yaml'], '--output and --figure'),
     ],
 )
 def test_a_rig_is_not_identified_from_what_is_no_tube(arguments, said, tmp_path, capsys):

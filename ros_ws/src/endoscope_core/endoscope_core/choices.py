@@ -1,9 +1,9 @@
-"""What an operator chooses by name: compensation, feedback, motions and devices.
+"""What an operator chooses by name: compensation, motions and devices.
 
 The names alone, so that whoever only lists them loads nothing of what they do.
 """
 
-HYSTERESIS_MODELS = ('bouc_wen', 'asymmetric_bouc_wen', 'dahl', 'play', 'prandtl_ishlinskii')
+HYSTERESIS_MODELS = ('bouc_wen', 'dahl')
 PHYSICAL = 'physical'
 """Mode that inverts the plant which a calibration identified."""
 ADAPTIVE_PHYSICAL = 'adaptive_physical'
@@ -18,11 +18,6 @@ BY_ADOPTED = 'adopted'
 """Selection by a plant file that has been adopted, whatever a calibration found."""
 SELECTIONS = (BY_CLASS, BY_SIZE, BY_PLANT, BY_ADOPTED)
 """What selects the parameters of a mode."""
-
-ADAPTIVE = 'adaptive'
-RECURSIVE_LEAST_SQUARES = 'recursive_least_squares'
-FEEDBACK_LAWS = (ADAPTIVE, RECURSIVE_LEAST_SQUARES)
-"""Laws by which feedback learns."""
 
 SINUSOID = 'sinusoid'
 """Name of the calibration sinusoid."""

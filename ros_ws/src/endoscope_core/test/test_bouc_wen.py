@@ -26,22 +26,22 @@ moves = st.floats(-1e6, 1e6) | st.floats(-1.0, 1.0) | st.floats(-1e-9, 1e-9)
 def test_state_stays_within_its_bound_for_steps_of_any_size(parameters, start, steps):
     y = start
     for step in steps:
-        y = parameters.memory_step(y, step, 0.0)
+        y = parameters.memory_step(y, step)
         assert abs(y) <= 1.0 + 1e-12
 
 
 @given(parameter_sets, st.floats(-1.0, 1.0), moves)
 def test_state_moves_with_its_driver(parameters, start, step):
-    change = parameters.memory_step(start, step, 0.0) - start
+    change = parameters.memory_step(start, step) - start
     assert change * step >= -1e-15
 
 
 @given(st.floats(-0.95, 1.0), st.floats(-1.0, 1.0), st.floats(-3.0, 3.0), st.floats(0.0, 1.0))
 def test_with_n_one_a_step_is_exact_so_it_may_be_cut_anywhere(rho, start, step, cut):
     parameters = BoucWenParameters.from_shape(1.0, 0.5, 0.5, rho, 1.0)
-    whole = parameters.memory_step(start, step, 0.0)
-    first = parameters.memory_step(start, cut * step, 0.0)
-    parts = parameters.memory_step(first, step - cut * step, 0.0)
+    whole = parameters.memory_step(start, step)
+    first = parameters.memory_step(start, cut * step)
+    parts = parameters.memory_step(first, step - cut * step)
     assert parts == pytest.approx(whole, abs=1e-12)
 
 

@@ -13,10 +13,10 @@ def test_a_law_is_never_guessed(tmp_path):
         with pytest.raises(InputError, match='did not'):
             choice.law('physical', by, nothing)
     with pytest.raises(InputError, match='not selected by plant'):
-        choice.law('play', 'plant', nothing)
+        choice.law('dahl', 'plant', nothing)
     with pytest.raises(InputError, match='unknown selection'):
-        choice.law('play', 'dice', nothing)
+        choice.law('dahl', 'dice', nothing)
     with pytest.raises(InputError, match='outside the table'):
-        choice.law('play', 'size', CalibrationFindings(size=3.0))
+        choice.law('dahl', 'size', CalibrationFindings(size=3.0))
     with pytest.raises(FileError, match='missing'):
-        LawChoice(2, table=str(tmp_path / 'none')).law('play', 'size', CalibrationFindings(size=1))
+        LawChoice(2, table=str(tmp_path / 'none')).law('dahl', 'size', CalibrationFindings(size=1))

@@ -2,16 +2,10 @@ import itertools
 
 import numpy as np
 import pytest
+from play_loop import play
 
 from endoscope_core.errors import InputError
-from endoscope_core.hysteresis import (
-    AsymmetricBoucWenParameters,
-    DahlParameters,
-    PlayParameters,
-    PrandtlIshlinskiiParameters,
-    forward,
-    prandtl_ishlinskii_forward,
-)
+from endoscope_core.hysteresis import DahlParameters, forward
 from endoscope_core.hysteresis.inverse import MODELS
 from endoscope_core.hysteresis.memory_model import (
     GREATEST_ALPHA,
@@ -23,41 +17,20 @@ from endoscope_core.identification.feedforward_fit import candidates_for
 
 TIME = np.arange(0.0, 9.0, 0.02)
 DRIVER = 1.5 * np.sin(TIME)
-TRUTHS = {
-    'dahl': DahlParameters(0.85, 0.5, 0.4, 1.7, 0.05),
-    'play': PlayParameters(0.85, 0.5, 0.55, -0.04),
-    'prandtl_ishlinskii': PrandtlIshlinskiiParameters(
-        tuple(1.5 / 20 * np.arange(20)), (0.1, *([0.0] * 5), 0.7, *([0.0] * 13)), 0.02
-    ),
-}
+TRUTH = DahlParameters(0.85, 0.5, 0.4, 1.7, 0.05)
 
 
-def answer(parameters, driver):
-    if isinstance(parameters, PrandtlIshlinskiiParameters):
-        return prandtl_ishlinskii_forward(parameters, driver)
-    return forward(parameters, driver)
-
-
-@pytest.mark.parametrize('model', TRUTHS)
-def test_a_model_is_found_again(model):
-    truth = TRUTHS[model]
-    fit = fit_model([Recording(DRIVER, answer(truth, DRIVER))], 0, model)
-    np.testing.assert_allclose(fit.predict(DRIVER), answer(truth, DRIVER), atol=0.002)
+def test_a_model_is_found_again():
+    fit = fit_model([Recording(DRIVER, forward(TRUTH, DRIVER))], 0, 'dahl')
+    np.testing.assert_allclose(fit.predict(DRIVER), forward(TRUTH, DRIVER), atol=0.002)
     assert fit.rmse < 1e-3
-    assert model in str(fit)
-
-
-def test_an_asymmetric_loop_is_fitted_better_by_the_asymmetric_model():
-    truth = AsymmetricBoucWenParameters(0.9, 0.5, 0.1, 0.05, 0.2, -0.5, 2.0, 0.3, 0.3, 1.5)
-    recordings = [Recording(DRIVER, forward(truth, DRIVER))]
-    plain, skewed = (fit_model(recordings, 0, m) for m in ('bouc_wen', 'asymmetric_bouc_wen'))
-    assert skewed.rmse < 0.3 * plain.rmse
+    assert 'dahl' in str(fit)
 
 
 @pytest.mark.parametrize('gain', [SMALLEST_ALPHA, 0.25, 1.0, GREATEST_ALPHA])
 @pytest.mark.parametrize('model', MODELS)
 def test_every_candidate_for_the_inverse_is_safe_whatever_the_gain_of_the_rig(model, gain):
-    fit = fit_model([Recording(DRIVER, gain * answer(TRUTHS['dahl'], DRIVER))], 0, model)
+    fit = fit_model([Recording(DRIVER, gain * forward(TRUTH, DRIVER))], 0, model)
     candidates = candidates_for(fit.parameters)
     for corner in itertools.product(*candidates.bounds):
         parameters = candidates.make(corner)
@@ -76,17 +49,16 @@ def test_whatever_is_recorded_what_comes_out_is_safe(model):
 
 
 def test_the_search_repeats_with_its_seed():
-    recordings = [Recording(DRIVER, answer(TRUTHS['dahl'], DRIVER))]
+    recordings = [Recording(DRIVER, forward(TRUTH, DRIVER))]
     assert fit_model(recordings, 3, 'dahl') == fit_model(recordings, 3, 'dahl')
 
 
-@pytest.mark.parametrize('model', sorted(set(MODELS) - {'bouc_wen'}))
-def test_the_feed_forward_of_every_model_makes_a_backlash_follow(model):
-    fit = fit_model([Recording(DRIVER, answer(TRUTHS['play'], DRIVER))], 0, model)
+def test_the_feed_forward_of_a_model_makes_a_backlash_follow():
+    fit = fit_model([Recording(DRIVER, play(DRIVER, 0.5))], 0, 'dahl')
     found = fit_feedforward(fit.parameters, Servo(), lead=0.06)
     assert found.rmse < 0.35 * found.uncompensated_rmse
     assert found.parameters.inverse_slope <= GREATEST_INVERSE_SLOPE
-    assert isinstance(found.parameters, MODELS[model])
+    assert isinstance(found.parameters, DahlParameters)
 
 
 def test_an_unknown_model_is_refused():

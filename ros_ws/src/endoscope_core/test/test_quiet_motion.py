@@ -13,7 +13,6 @@ from endoscope_core.control import (
     Feedforward,
     Handle,
     PhysicalParameters,
-    RecursiveHysteresisController,
     TrackerMeasurement,
     shipped_limits,
 )
@@ -28,12 +27,11 @@ RATES = (50, 250, 1000)
 FEEDBACK = {
     'alone': None,
     'adaptive': AdaptiveBacklashController,
-    'recursive': RecursiveHysteresisController,
 }
 # Every mode alone, and at every rate what the defaults are and what amplifies most.
 CASES = [(mode, 'alone', 1000) for mode in MODES]
 CASES += [('bouc_wen', 'adaptive', rate) for rate in RATES]
-CASES += [('physical', 'recursive', rate) for rate in RATES]
+CASES += [('physical', 'adaptive', rate) for rate in RATES]
 CASES += [('none', 'adaptive', 50), (ADAPTIVE_PHYSICAL, 'alone', 50)]
 
 

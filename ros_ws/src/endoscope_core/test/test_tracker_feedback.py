@@ -5,23 +5,18 @@ import math
 import numpy as np
 import pytest
 
-from endoscope_core.control import (
-    AdaptiveBacklashController,
-    RecursiveHysteresisController,
-    TrackerMeasurement,
-)
+from endoscope_core.control import AdaptiveBacklashController, TrackerMeasurement
 from endoscope_core.control.limits import SHARE_OF_TRAVEL
 
 TICK = 1e-3
 PERIOD = 25
-CONTROLLERS = (AdaptiveBacklashController, RecursiveHysteresisController)
 
 
 class Drive:
     """A controller on a play with gain behind a servo, driven tick by tick."""
 
-    def __init__(self, make, half_gap=0.4):
-        self.controller = make(1)
+    def __init__(self, half_gap=0.4):
+        self.controller = AdaptiveBacklashController(1)
         self.controller.activate()
         self.half_gap = half_gap
         self.motor = self.joint = 0.0
@@ -46,10 +41,10 @@ class Drive:
         return np.array(desired), np.array(corrections)
 
 
-@pytest.fixture(params=CONTROLLERS)
-def at_rest(request):
+@pytest.fixture
+def at_rest():
     """A controller that has learnt and now rests; what it corrects."""
-    drive = Drive(request.param)
+    drive = Drive()
     drive.run(10.0, math.sin)
     stop = 10.0
     _, corrections = drive.run(1.0, lambda _: math.sin(stop))
@@ -86,9 +81,8 @@ def test_at_rest_it_stays_when_it_is_switched_off_and_on_and_forgets(at_rest):
         assert not drive.controller.faded
 
 
-@pytest.mark.parametrize('make', CONTROLLERS)
-def test_a_tracker_that_was_gone_moves_the_correction_no_faster_than_stated(make):
-    drive = Drive(make)
+def test_a_tracker_that_was_gone_moves_the_correction_no_faster_than_stated():
+    drive = Drive()
     drive.run(10.0, math.sin)
     learnt = drive.controller.learnt
     start = math.sin(10.0)
@@ -111,9 +105,8 @@ def test_a_tracker_that_was_gone_moves_the_correction_no_faster_than_stated(make
     assert np.max(step[400:]) <= own
 
 
-@pytest.mark.parametrize('make', CONTROLLERS)
-def test_the_first_measurement_after_a_gap_teaches_nothing(make):
-    drive = Drive(make)
+def test_the_first_measurement_after_a_gap_teaches_nothing():
+    drive = Drive()
     drive.run(10.0, math.sin)
     drive.run(1.0, math.sin, tracker=False)
     learnt = drive.controller.learnt
@@ -123,9 +116,8 @@ def test_the_first_measurement_after_a_gap_teaches_nothing(make):
     assert drive.controller.learnt == learnt
 
 
-@pytest.mark.parametrize('make', CONTROLLERS)
-def test_switched_off_the_correction_fades_to_nothing_as_it_moves(make):
-    drive = Drive(make)
+def test_switched_off_the_correction_fades_to_nothing_as_it_moves():
+    drive = Drive()
     drive.run(10.0, math.sin)
     drive.controller.deactivate()
     _, corrections = drive.run(5.0, math.sin)

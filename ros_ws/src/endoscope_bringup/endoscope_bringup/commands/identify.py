@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from endoscope_bringup.subcommands import COUNT, seed, within
+from endoscope_core.choices import HYSTERESIS_MODELS, PHYSICAL
 from endoscope_core.errors import FileError
 
 if TYPE_CHECKING:
@@ -16,14 +17,7 @@ if TYPE_CHECKING:
     from endoscope_core.hysteresis.inverse import HysteresisParameters
     from endoscope_core.identification import Recording
 
-MODELS = (
-    'bouc_wen',
-    'asymmetric_bouc_wen',
-    'dahl',
-    'play',
-    'prandtl_ishlinskii',
-    'physical',
-)
+MODELS = (*HYSTERESIS_MODELS, PHYSICAL)
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -92,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
         raise EndoscopeError('--output and --figure are for `identify family FOLDER`')
     if args.model is None:
         raise EndoscopeError(f'no --model: choose one of {", ".join(MODELS)}')
-    if args.table is not None and (is_dataset(args.source) or args.model == 'physical'):
+    if args.table is not None and (is_dataset(args.source) or args.model == PHYSICAL):
         raise EndoscopeError('--table takes a bag and the name of a hysteresis model')
     content = _of_dataset(args) if is_dataset(args.source) else _of_bag(args)
     text = json.dumps(content, indent=1) + '\n'
@@ -149,7 +143,7 @@ def _of_bag(args: argparse.Namespace) -> dict[str, object]:
     from endoscope_core.control import FeedforwardSettings
     from endoscope_core.identification import Servo, fit_feedforward, fit_model
 
-    if args.model == 'physical':
+    if args.model == PHYSICAL:
         return _plant_of_bag(args)
     lead = FeedforwardSettings().lead
     joints: dict[str, object] = {}

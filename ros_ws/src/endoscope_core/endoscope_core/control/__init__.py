@@ -18,10 +18,6 @@ from endoscope_core.control.internal_model import PhysicalParameters, bending_ra
 from endoscope_core.control.limits import MotorLimits, shipped_limits
 from endoscope_core.control.physical_inverse import AdaptivePhysicalInverse, PhysicalInverse
 from endoscope_core.control.plant_learning import PlantLearning, PlantLearningSettings
-from endoscope_core.control.recursive_hysteresis import (
-    RecursiveHysteresisController,
-    RecursiveHysteresisSettings,
-)
 from endoscope_core.control.tracker_feedback import TrackerFeedback, TrackerMeasurement
 
 __all__ = [
@@ -45,8 +41,6 @@ __all__ = [
     'PhysicalParameters',
     'PlantLearning',
     'PlantLearningSettings',
-    'RecursiveHysteresisController',
-    'RecursiveHysteresisSettings',
     'TrackerFeedback',
     'TrackerMeasurement',
     'adopted_plant',

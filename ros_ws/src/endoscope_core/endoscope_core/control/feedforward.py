@@ -22,7 +22,7 @@ from endoscope_core.control.limits import (
 )
 from endoscope_core.control.physical_inverse import AdaptivePhysicalInverse, PhysicalInverse
 from endoscope_core.hysteresis.dahl import dahl_step
-from endoscope_core.hysteresis.inverse import MODELS, HysteresisParameters, inverse_of
+from endoscope_core.hysteresis.inverse import MODELS, DirectInverse, HysteresisParameters
 
 Vector = Sequence[float] | NDArray[np.float64]
 LawParameters = HysteresisParameters | PhysicalParameters
@@ -87,7 +87,7 @@ class HysteresisInverse:
         self._parameters = parameters
         self._lead = lead
         self._foreseen = Play(0.5 * dead_band, 0.0)
-        self._inverse = inverse_of(parameters, 0.0, 0.0)
+        self._inverse = DirectInverse(parameters, 0.0, 0.0)
 
     @property
     def direction(self) -> float:
@@ -96,7 +96,7 @@ class HysteresisInverse:
     def begin(self, direction: float, desired: float, velocity: float) -> float:
         """Start with the memory that `direction` says."""
         self._foreseen.value = desired + self._lead * velocity
-        self._inverse = inverse_of(self._parameters, direction, self._foreseen.value)
+        self._inverse = DirectInverse(self._parameters, direction, self._foreseen.value)
         return self._inverse.command()
 
     def wanted(self, desired: float, velocity: float, dt: float) -> float:

@@ -1,4 +1,4 @@
-"""Bouc-Wen hysteresis, symmetric (equations 3 to 5 of the first paper) and asymmetric."""
+"""Bouc-Wen hysteresis (equations 3 to 5 of the first paper)."""
 
 from __future__ import annotations
 
@@ -15,20 +15,14 @@ from endoscope_core.hysteresis.memory_model import (
     GREATEST_ALPHA,
     GREATEST_INVERSE_SLOPE,
     GREATEST_LAG,
-    GREATEST_OFFSET,
     SMALLEST_ALPHA,
-    ConstantLag,
     NamedNumbers,
-    check_inverse,
     check_numbers,
-    check_range,
 )
 
 _LONGEST_SUBSTEP = 0.1
 _MOST_SUBSTEPS = 64
 GREATEST_EXPONENT = 5.0
-GREATEST_SKEW = 0.5
-GREATEST_ANGLE = 1.75
 
 
 # With ``y = h / h_max``, ``h_max = (A / (B + C))**(1/n)``, ``rho = (B - C) / (B + C)``, and ``x``
@@ -89,29 +83,21 @@ def bouc_wen_normalised_step(y: float, delta: float, travel: float, rho: float, 
 
 @njit(cache=True)
 def bouc_wen_path(
-    driver: NDArray[np.float64],
-    y0: float,
-    up: tuple[float, float, float],
-    down: tuple[float, float, float],
+    driver: NDArray[np.float64], y0: float, travel: float, rho: float, n: float
 ) -> NDArray[np.float64]:
-    """Normalised states along a driving angle (N,) in rad, `y0` at the first sample.
-
-    `up` and `down` hold travel, rho and n of either direction.
-    """
+    """Normalised states along a driving angle (N,) in rad, `y0` at the first sample."""
     states = np.empty(driver.size)
     y = y0
     previous = driver[0]
     for k in range(driver.size):
-        delta = driver[k] - previous
-        travel, rho, n = up if delta >= 0.0 else down
-        y = bouc_wen_normalised_step(y, delta, travel, rho, n)
+        y = bouc_wen_normalised_step(y, driver[k] - previous, travel, rho, n)
         previous = driver[k]
         states[k] = y
     return states
 
 
 @dataclass(frozen=True)
-class BoucWenParameters(NamedNumbers, ConstantLag):
+class BoucWenParameters(NamedNumbers):
     """The six parameters of equations 3 to 5, refused unless their inverse is safe to drive with.
 
     ``theta_a = alpha theta + beta h`` and ``h' = A theta' - B |theta'| |h|^(n-1) h - C theta'
@@ -201,12 +187,11 @@ class BoucWenParameters(NamedNumbers, ConstantLag):
         """Equation 3 has none."""
         return 0.0
 
-    def memory_step(self, y: float, delta: float, angle: float) -> float:
+    def memory_step(self, y: float, delta: float) -> float:
         return float(bouc_wen_normalised_step(y, delta, self.travel, self.rho, self.n))
 
     def memory_path(self, driver: NDArray[np.float64], y0: float) -> NDArray[np.float64]:
-        shape = self.travel, self.rho, self.n
-        states: NDArray[np.float64] = bouc_wen_path(driver, y0, shape, shape)
+        states: NDArray[np.float64] = bouc_wen_path(driver, y0, self.travel, self.rho, self.n)
         return states
 
     @classmethod
@@ -223,86 +208,3 @@ class BoucWenParameters(NamedNumbers, ConstantLag):
             C=0.5 * (1.0 - rho) * total,
             n=n,
         )
-
-
-@dataclass(frozen=True)
-class AsymmetricBoucWenParameters(NamedNumbers):
-    """``theta_a = alpha theta + offset - (lag + skew theta) y`` with `y` built up by direction.
-
-    The symmetric model (equations 3 and 4 of the first paper) in normalised form, `y` = h / h_max,
-    with shape parameters of its own for either direction, as in the asymmetric extensions of the
-    Bouc-Wen model (Wang and Wen 1998; Zhu and Wang 2012), a loop that may be wider at one end, and
-    an offset. The state stays in [-1, 1] for a step of any size because each direction's step does
-    (see `bouc_wen_normalised_step`). Angles are in rad.
-
-    ValueError if a parameter is out of range or the inverse would be steeper than 40.
-    """
-
-    MODEL: ClassVar[str] = 'asymmetric Bouc-Wen'
-
-    alpha: float  # ratio of actual to driving angle, in [0.2, 3]
-    lag: float  # half the width of a saturated loop at angle zero, along the actual angle, rad
-    # Growth of that half-width with the angle, in [-0.5, 0.5]; beyond 1.75 rad it grows no more.
-    skew: float
-    offset: float  # rad
-    # rad over which the state builds up in either direction.
-    travel_up: float
-    # In (-1, 1]; how much faster the state leaves saturation than from rest.
-    rho_up: float
-    # Sharpness, in [1, 5].
-    n_up: float
-    travel_down: float
-    rho_down: float
-    n_down: float
-
-    def __post_init__(self) -> None:
-        name = self.MODEL
-        check_numbers(name, asdict(self))
-        for side in ('up', 'down'):
-            check_range(name, f'travel_{side}', getattr(self, f'travel_{side}'), 1e-4, 100.0)
-            check_range(name, f'rho_{side}', getattr(self, f'rho_{side}'), -1.0 + 1e-6, 1.0)
-            check_range(name, f'n_{side}', getattr(self, f'n_{side}'), 1.0, GREATEST_EXPONENT)
-        check_range(name, 'offset', self.offset, -GREATEST_OFFSET, GREATEST_OFFSET)
-        check_range(name, 'skew', self.skew, -GREATEST_SKEW, GREATEST_SKEW)
-        if abs(self.skew) > 0.9 * self.alpha:
-            raise ValueError(
-                f'{name} skew = {self.skew:g} must stay below 0.9 alpha = {0.9 * self.alpha:g}, '
-                'or a branch turns back'
-            )
-        check_inverse(name, self.alpha, self.lag, self.inverse_slope)
-
-    @property
-    def inverse_slope(self) -> float:
-        """Bound of the slope of the direct inverse for angles up to 1.75 rad."""
-        steepest = max(
-            max(1.0, 1.0 + self.rho_up) / self.travel_up,
-            max(1.0, 1.0 + self.rho_down) / self.travel_down,
-        )
-        widest = self.lag + abs(self.skew) * GREATEST_ANGLE
-        return (1.0 + abs(self.skew) + widest * steepest) / self.alpha
-
-    def memory_step(self, y: float, delta: float, angle: float) -> float:
-        if delta >= 0.0:
-            shape = self.travel_up, self.rho_up, self.n_up
-        else:
-            shape = self.travel_down, self.rho_down, self.n_down
-        return float(bouc_wen_normalised_step(y, delta, *shape))
-
-    def memory_path(self, driver: NDArray[np.float64], y0: float) -> NDArray[np.float64]:
-        states: NDArray[np.float64] = bouc_wen_path(
-            driver,
-            y0,
-            (self.travel_up, self.rho_up, self.n_up),
-            (self.travel_down, self.rho_down, self.n_down),
-        )
-        return states
-
-    def lag_at(self, angle: float) -> float:
-        """Half-width of the loop at an angle, rad; never negative."""
-        bounded = min(GREATEST_ANGLE, max(-GREATEST_ANGLE, angle))
-        return max(0.0, self.lag + self.skew * bounded)
-
-    def lags_at(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-        bounded = np.clip(angles, -GREATEST_ANGLE, GREATEST_ANGLE)
-        lags: NDArray[np.float64] = np.maximum(0.0, self.lag + self.skew * bounded)
-        return lags

@@ -1,4 +1,4 @@
-"""Dahl hysteresis and the play operator, its limit without memory, and their direct inverses."""
+"""Dahl hysteresis and its direct inverse (section 2.3 of the second paper)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from endoscope_core.compiled import njit
 from endoscope_core.hysteresis.memory_model import (
     GREATEST_OFFSET,
-    ConstantLag,
     NamedNumbers,
     check_inverse,
     check_numbers,
@@ -69,27 +68,8 @@ def dahl_path(
     return states
 
 
-@njit(cache=True)
-def play_step(y: float, delta: float, travel: float) -> float:
-    """State in [-1, 1] of a play of half-gap `travel` rad, exactly, for any step `delta` rad."""
-    return min(1.0, max(-1.0, y + delta / travel))
-
-
-@njit(cache=True)
-def play_path(driver: NDArray[np.float64], y0: float, travel: float) -> NDArray[np.float64]:
-    """States along a driving angle (N,) in rad, `y0` at the first sample."""
-    states = np.empty(driver.size)
-    y = y0
-    previous = driver[0]
-    for k in range(driver.size):
-        y = play_step(y, driver[k] - previous, travel)
-        previous = driver[k]
-        states[k] = y
-    return states
-
-
 @dataclass(frozen=True)
-class DahlParameters(NamedNumbers, ConstantLag):
+class DahlParameters(NamedNumbers):
     """``theta_a = alpha theta + offset - lag y``, `y` in [-1, 1] by the Dahl equation (rad).
 
     Second paper, section 2.3: a modification of the Dahl model with a direct inverse that needs no
@@ -119,48 +99,9 @@ class DahlParameters(NamedNumbers, ConstantLag):
         """Bound of the slope of the direct inverse."""
         return (1.0 + 2.0**self.exponent * self.lag / self.travel) / self.alpha
 
-    def memory_step(self, y: float, delta: float, angle: float) -> float:
+    def memory_step(self, y: float, delta: float) -> float:
         return float(dahl_step(y, delta, self.travel, self.exponent))
 
     def memory_path(self, driver: NDArray[np.float64], y0: float) -> NDArray[np.float64]:
         states: NDArray[np.float64] = dahl_path(driver, y0, self.travel, self.exponent)
-        return states
-
-
-@dataclass(frozen=True)
-class PlayParameters(NamedNumbers, ConstantLag):
-    """``theta_a = alpha theta + offset - lag y``, ``y' = theta' / travel`` within [-1, 1].
-
-    With ``travel = lag / alpha`` this is the play (backlash) model of Tao and Kokotovic, which the
-    second paper starts from: half-gap `travel`, gain `alpha`; between the sides of the gap the
-    output rests. Its exact inverse jumps by ``2 lag / alpha`` at each reversal. A shorter `travel`
-    in the inverse crosses the gap within that much motion of the desired angle instead, which
-    bounds its slope.
-
-    ValueError if a parameter is out of range or the inverse would be steeper than 40.
-    """
-
-    MODEL: ClassVar[str] = 'play'
-
-    alpha: float  # gain, in [0.2, 3]
-    lag: float  # half the width of the loop along the actual angle, rad
-    travel: float  # rad of the driving angle from the middle of the gap to its side
-    offset: float = 0.0  # rad
-
-    def __post_init__(self) -> None:
-        check_numbers(self.MODEL, asdict(self))
-        check_range(self.MODEL, 'offset', self.offset, -GREATEST_OFFSET, GREATEST_OFFSET)
-        check_range(self.MODEL, 'travel', self.travel, 1e-6, 100.0)
-        check_inverse(self.MODEL, self.alpha, self.lag, self.inverse_slope)
-
-    @property
-    def inverse_slope(self) -> float:
-        """Greatest slope of the inverse."""
-        return (1.0 + self.lag / self.travel) / self.alpha
-
-    def memory_step(self, y: float, delta: float, angle: float) -> float:
-        return float(play_step(y, delta, self.travel))
-
-    def memory_path(self, driver: NDArray[np.float64], y0: float) -> NDArray[np.float64]:
-        states: NDArray[np.float64] = play_path(driver, y0, self.travel)
         return states

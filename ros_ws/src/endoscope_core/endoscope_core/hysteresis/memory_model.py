@@ -74,26 +74,11 @@ class NamedNumbers:
         return cls(**{name: float(value) for name, value in values.items()})
 
 
-class _WithLag(Protocol):
-    @property
-    def lag(self) -> float: ...
-
-
-class ConstantLag:
-    """One `lag` of a `MemoryModel`: a saturated loop's half-width along the actual angle, rad."""
-
-    def lag_at(self: _WithLag, angle: float) -> float:
-        return self.lag
-
-    def lags_at(self: _WithLag, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.full(angles.shape, self.lag)
-
-
 class MemoryModel(Protocol):
-    """``theta_a = alpha theta + offset - lag(theta) y``: Bouc-Wen, Dahl and play are of this form.
+    """``theta_a = alpha theta + offset - lag y``: Bouc-Wen and Dahl are of this form.
 
     The direct inverse (equation 5 of the first paper, section 2.3 of the second) drives `y` with
-    the desired angle and puts out ``(theta_d - offset + lag(theta_d) y) / alpha``.
+    the desired angle and puts out ``(theta_d - offset + lag y) / alpha``.
     """
 
     @property
@@ -111,16 +96,13 @@ class MemoryModel(Protocol):
         """Bound of the slope of the direct inverse."""
         ...
 
-    def lag_at(self, angle: float) -> float:
+    @property
+    def lag(self) -> float:
         """Half-width of a saturated loop along the actual angle, rad."""
         ...
 
-    def lags_at(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The same for many angles (N,)."""
-        ...
-
-    def memory_step(self, y: float, delta: float, angle: float) -> float:
-        """Memory after a move by `delta` rad to `angle`."""
+    def memory_step(self, y: float, delta: float) -> float:
+        """Memory after a move by `delta` rad."""
         ...
 
     def memory_path(self, driver: NDArray[np.float64], y0: float) -> NDArray[np.float64]:
@@ -135,20 +117,16 @@ class MemoryModel(Protocol):
 def forward(model: MemoryModel, theta: ArrayLike, y0: float = 0.0) -> NDArray[np.float64]:
     """Actual angle (N,) for a driving angle (N,), both in rad; the memory begins at `y0`."""
     driver = _series(theta)
-    lags = model.lags_at(driver)
-    result: NDArray[np.float64] = (
-        model.alpha * driver + model.offset - lags * model.memory_path(driver, y0)
-    )
+    memory = model.memory_path(driver, y0)
+    result: NDArray[np.float64] = model.alpha * driver + model.offset - model.lag * memory
     return result
 
 
 def direct_inverse(model: MemoryModel, theta_d: ArrayLike, y0: float = 0.0) -> NDArray[np.float64]:
     """Command (N,) for a desired angle (N,), both in rad; the memory begins at `y0`."""
     driver = _series(theta_d)
-    lags = model.lags_at(driver)
-    result: NDArray[np.float64] = (
-        driver - model.offset + lags * model.memory_path(driver, y0)
-    ) / model.alpha
+    memory = model.memory_path(driver, y0)
+    result: NDArray[np.float64] = (driver - model.offset + model.lag * memory) / model.alpha
     return result
 
 

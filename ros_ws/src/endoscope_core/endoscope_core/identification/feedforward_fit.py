@@ -15,7 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
-from endoscope_core import hysteresis
+from endoscope_core.hysteresis import (
+    BoucWenParameters,
+    DahlParameters,
+    direct_inverse,
+    forward,
+)
 from endoscope_core.hysteresis.inverse import HysteresisParameters
 from endoscope_core.hysteresis.memory_model import (
     GREATEST_ALPHA,
@@ -23,7 +28,6 @@ from endoscope_core.hysteresis.memory_model import (
     GREATEST_LAG,
     SMALLEST_ALPHA,
 )
-from endoscope_core.hysteresis.prandtl_ishlinskii import LONGEST_THRESHOLD, SMALLEST_FIRST_WEIGHT
 from endoscope_core.physics import JointParameters
 from endoscope_core.signals import Signal, sum_of_sines
 from endoscope_core.signals.motions import teleoperation_like
@@ -83,69 +87,27 @@ def candidates_for(model: HysteresisParameters) -> Candidates:
 
     The steeper the inverse, the better it crosses the dead zone; it is therefore nearly as steep as
     its class allows, and the travel follows from that, so that every candidate is safe by
-    construction. Gain, lag and sharpness are free; offset and skew are the model's. `rho` hardly
+    construction. Gain, lag and sharpness are free; the offset is the model's. `rho` hardly
     matters and is kept where the state leaves saturation gently.
     """
-    if isinstance(model, hysteresis.PrandtlIshlinskiiParameters):
-        # Its inverse is exact: only the scales of its weights and thresholds are free.
-        return _play_stack(model)
     gain_and_lag = [
         (max(0.7 * model.alpha, SMALLEST_ALPHA), min(1.4 * model.alpha, GREATEST_ALPHA)),
         (0.01, min(2.5 * model.lag + 0.2, GREATEST_LAG)),
     ]
-    if isinstance(model, hysteresis.BoucWenParameters):
+    if isinstance(model, BoucWenParameters):
         return Candidates([*gain_and_lag, (1.0, 4.0)], _bouc_wen)
-    if isinstance(model, hysteresis.DahlParameters):
-        return Candidates([*gain_and_lag, (0.6, 3.0)], lambda x: _dahl(x, model.offset))
-    if isinstance(model, hysteresis.PlayParameters):
-        return Candidates(gain_and_lag, lambda x: _play(x, model.offset))
-    return Candidates([*gain_and_lag, (1.0, 4.0)], lambda x: _asymmetric(x, model))
+    return Candidates([*gain_and_lag, (0.6, 3.0)], lambda x: _dahl(x, model.offset))
 
 
-def _bouc_wen(x: Sequence[float]) -> hysteresis.BoucWenParameters:
+def _bouc_wen(x: Sequence[float]) -> BoucWenParameters:
     alpha, lag, n = x
-    return hysteresis.BoucWenParameters.from_shape(
-        alpha, lag, lag / (alpha * _SLOPE - 1.0), _RHO, n
-    )
+    return BoucWenParameters.from_shape(alpha, lag, lag / (alpha * _SLOPE - 1.0), _RHO, n)
 
 
-def _dahl(x: Sequence[float], offset: float) -> hysteresis.DahlParameters:
+def _dahl(x: Sequence[float], offset: float) -> DahlParameters:
     alpha, lag, exponent = x
     travel = 2.0**exponent * lag / (alpha * _SLOPE - 1.0)
-    return hysteresis.DahlParameters(alpha, lag, travel, exponent, offset)
-
-
-def _play(x: Sequence[float], offset: float) -> hysteresis.PlayParameters:
-    alpha, lag = x
-    return hysteresis.PlayParameters(alpha, lag, lag / (alpha * _SLOPE - 1.0), offset)
-
-
-def _asymmetric(
-    x: Sequence[float], model: hysteresis.AsymmetricBoucWenParameters
-) -> hysteresis.AsymmetricBoucWenParameters:
-    alpha, lag, n = x
-    skew = min(0.45 * alpha, max(-0.45 * alpha, model.skew))
-    travel = (lag + 1.75 * abs(skew)) / (alpha * _SLOPE - 1.0 - abs(skew))
-    shape = travel, _RHO, n
-    return hysteresis.AsymmetricBoucWenParameters(alpha, lag, skew, model.offset, *shape, *shape)
-
-
-def _play_stack(model: hysteresis.PrandtlIshlinskiiParameters) -> Candidates:
-    total = sum(model.weights)
-    widest = LONGEST_THRESHOLD / max(model.thresholds[-1], 1e-9)
-
-    def make(x: Sequence[float]) -> hysteresis.PrandtlIshlinskiiParameters:
-        gain, width = x
-        weights = [gain * weight for weight in model.weights]
-        weights[0] = max(weights[0], SMALLEST_FIRST_WEIGHT)
-        return hysteresis.PrandtlIshlinskiiParameters(
-            tuple(width * threshold for threshold in model.thresholds),
-            tuple(weights),
-            model.offset,
-        )
-
-    gains = (max(0.7, 0.201 / total), max(0.8, min(1.4, 0.99 * GREATEST_ALPHA / total)))
-    return Candidates([gains, (0.7, max(0.8, min(1.4, widest)))], make)
+    return DahlParameters(alpha, lag, travel, exponent, offset)
 
 
 @dataclass(frozen=True)
@@ -194,18 +156,6 @@ def fit_feedforward(
     )
 
 
-def _inverse(parameters: HysteresisParameters, desired: Array) -> Array:
-    if isinstance(parameters, hysteresis.PrandtlIshlinskiiParameters):
-        return hysteresis.prandtl_ishlinskii_inverse(parameters, desired)
-    return hysteresis.direct_inverse(parameters, desired)
-
-
-def _forward(parameters: HysteresisParameters, driver: Array) -> Array:
-    if isinstance(parameters, hysteresis.PrandtlIshlinskiiParameters):
-        return hysteresis.prandtl_ishlinskii_forward(parameters, driver)
-    return hysteresis.forward(parameters, driver)
-
-
 @dataclass(frozen=True)
 class _Case:
     desired: Array
@@ -223,6 +173,6 @@ class _Case:
     def errors(
         self, candidate: HysteresisParameters | None, model: HysteresisParameters, servo: Servo
     ) -> Array:
-        command = self.desired if candidate is None else _inverse(candidate, self.foreseen)
-        reached = _forward(model, servo.answer(command, _STEP))
+        command = self.desired if candidate is None else direct_inverse(candidate, self.foreseen)
+        reached = forward(model, servo.answer(command, _STEP))
         return (reached - self.desired)[self.scored]

@@ -14,17 +14,9 @@ from numpy.typing import NDArray
 from scipy.optimize import differential_evolution, lsq_linear
 
 from endoscope_core.errors import InputError
-from endoscope_core.hysteresis import (
-    AsymmetricBoucWenParameters,
-    BoucWenParameters,
-    DahlParameters,
-    PlayParameters,
-    PrandtlIshlinskiiParameters,
-    forward,
-    prandtl_ishlinskii_forward,
-)
+from endoscope_core.hysteresis import BoucWenParameters, DahlParameters, forward
 from endoscope_core.hysteresis.bouc_wen import bouc_wen_path
-from endoscope_core.hysteresis.dahl import dahl_path, play_path
+from endoscope_core.hysteresis.dahl import dahl_path
 from endoscope_core.hysteresis.inverse import HysteresisParameters
 from endoscope_core.hysteresis.memory_model import (
     GREATEST_ALPHA,
@@ -33,10 +25,8 @@ from endoscope_core.hysteresis.memory_model import (
     GREATEST_OFFSET,
     SMALLEST_ALPHA,
 )
-from endoscope_core.hysteresis.prandtl_ishlinskii import SMALLEST_FIRST_WEIGHT, play_states
 
 Array = NDArray[np.float64]
-MemoryParameters = BoucWenParameters | AsymmetricBoucWenParameters | DahlParameters | PlayParameters
 
 SHORTEST_TRAVEL = float(np.deg2rad(2.0))
 LONGEST_TRAVEL = float(np.deg2rad(90.0))
@@ -47,7 +37,6 @@ LAG_BOUNDS = (0.0, GREATEST_LAG)
 ALPHA_BOUNDS = (SMALLEST_ALPHA, GREATEST_ALPHA)
 # What is rounded for a file must still pass the limit.
 _SLOPE = 0.99 * GREATEST_INVERSE_SLOPE
-ELEMENTS = 20
 _SMALLEST_MOTION = float(np.deg2rad(1.0))
 
 
@@ -56,17 +45,11 @@ class ModelFamily:
     """How a model is fitted by variable projection (Golub and Pereyra 1973)."""
 
     shape_bounds: tuple[tuple[float, float], ...]  # of the parameters that are searched
-    linear_bounds: tuple[tuple[float, float], ...]  # of the factors of `columns`
     path: Callable[[Array, float, Array], Array]  # from driver, y0 and shape to y (N,)
-    columns: Callable[[Array, Array], Array]  # from driver and y to (N, K)
     # From shape, factors and offset; safe whatever they are within their bounds: where the inverse
     # would be too steep, the travel is lengthened.
-    build: Callable[[Array, Array, float], MemoryParameters]
+    build: Callable[[Array, Array, float], HysteresisParameters]
     has_offset: bool  # of the model itself
-
-
-def _two_columns(driver: Array, y: Array) -> Array:
-    return np.stack([driver, -y], axis=1)
 
 
 def _travel(log_travel: float, alpha: float, lag: float, steepest: float) -> float:
@@ -86,79 +69,24 @@ def _dahl(shape: Array, factors: Array, offset: float) -> DahlParameters:
     return DahlParameters(alpha, lag, travel, exponent, _bounded(offset))
 
 
-def _play(shape: Array, factors: Array, offset: float) -> PlayParameters:
-    alpha, lag = factors.tolist()
-    return PlayParameters(alpha, lag, _travel(shape[0], alpha, lag, 1.0), _bounded(offset))
-
-
-def _asymmetric(shape: Array, factors: Array, offset: float) -> AsymmetricBoucWenParameters:
-    alpha, lag, skew = factors.tolist()
-    skew = float(np.clip(skew, -0.45 * alpha, 0.45 * alpha))
-    widest = lag + 1.75 * abs(skew)
-    room = _SLOPE * alpha - 1.0 - abs(skew)
-    travels = [
-        float(max(np.exp(shape[k]), max(1.0, 1.0 + shape[k + 1]) * widest / room)) for k in (0, 3)
-    ]
-    rho_up, n_up, rho_down, n_down = (float(shape[k]) for k in (1, 2, 4, 5))
-    return AsymmetricBoucWenParameters(
-        alpha,
-        lag,
-        skew,
-        _bounded(offset),
-        travels[0],
-        rho_up,
-        n_up,
-        travels[1],
-        rho_down,
-        n_down,
-    )
-
-
 def _bounded(offset: float) -> float:
     return float(np.clip(offset, -GREATEST_OFFSET, GREATEST_OFFSET))
-
-
-def _shape(s: Array) -> tuple[float, float, float]:
-    """Travel in rad, rho and n from a search's numbers (3,); the travel is a logarithm there."""
-    return np.exp(s[0]), s[1], s[2]
 
 
 FAMILIES: dict[str, ModelFamily] = {
     'bouc_wen': ModelFamily(
         (TRAVEL_BOUNDS, RHO_BOUNDS, EXPONENT_BOUNDS),
-        (ALPHA_BOUNDS, LAG_BOUNDS),
-        lambda driver, y0, s: bouc_wen_path(driver, y0, _shape(s), _shape(s)),
-        _two_columns,
+        lambda driver, y0, s: bouc_wen_path(driver, y0, np.exp(s[0]), s[1], s[2]),
         _bouc_wen,
         has_offset=False,
     ),
-    'asymmetric_bouc_wen': ModelFamily(
-        (TRAVEL_BOUNDS, RHO_BOUNDS, EXPONENT_BOUNDS) * 2,
-        (ALPHA_BOUNDS, LAG_BOUNDS, (-0.3, 0.3)),
-        lambda driver, y0, s: bouc_wen_path(driver, y0, _shape(s[:3]), _shape(s[3:])),
-        lambda driver, y: np.stack([driver, -y, -driver * y], axis=1),
-        _asymmetric,
-        has_offset=True,
-    ),
     'dahl': ModelFamily(
         (TRAVEL_BOUNDS, (0.5, 4.0)),
-        (ALPHA_BOUNDS, LAG_BOUNDS),
         lambda driver, y0, s: dahl_path(driver, y0, np.exp(s[0]), s[1]),
-        _two_columns,
         _dahl,
         has_offset=True,
     ),
-    'play': ModelFamily(
-        (TRAVEL_BOUNDS,),
-        (ALPHA_BOUNDS, LAG_BOUNDS),
-        lambda driver, y0, s: play_path(driver, y0, np.exp(s[0])),
-        _two_columns,
-        _play,
-        has_offset=True,
-    ),
 }
-"""The models with one memory. The play's travel is free: where it is not ``lag / alpha`` the sides
-of the gap are joined by a slope, which real wires have."""
 
 
 @dataclass(frozen=True)
@@ -189,22 +117,16 @@ class ModelFit:
     offset: float = 0.0
 
     def __str__(self) -> str:
-        rows = []
-        for name, value in self.parameters.to_dict().items():
-            numbers = value if isinstance(value, list) else [value]
-            rows.append(f'  {name:<12}' + ' '.join(f'{number:10.4f}' for number in numbers))
+        rows = [f'  {name:<12}{value:10.4f}' for name, value in self.parameters.to_dict().items()]
         return '\n'.join([f'{self.model}, {np.rad2deg(self.rmse):.2f} deg rms', *rows])
 
     def predict(self, driver: Array, y0: float = 0.0) -> Array:
         """Actual angle (N,) in rad for a driving angle (N,), offset included.
 
-        `y0` is the memory at the first sample; Prandtl-Ishlinskii begins at rest.
+        `y0` is the memory at the first sample.
         """
-        parameters = self.parameters
-        if isinstance(parameters, PrandtlIshlinskiiParameters):
-            return prandtl_ishlinskii_forward(parameters, driver)
-        missing = self.offset if isinstance(parameters, BoucWenParameters) else 0.0
-        return forward(parameters, driver, y0) + missing
+        missing = 0.0 if FAMILIES[self.model].has_offset else self.offset
+        return forward(self.parameters, driver, y0) + missing
 
 
 def fit_model(recordings: Sequence[Recording], seed: int = 0, model: str = 'bouc_wen') -> ModelFit:
@@ -216,11 +138,8 @@ def fit_model(recordings: Sequence[Recording], seed: int = 0, model: str = 'bouc
     moves.
     """
     _check(recordings)
-    if model == 'prandtl_ishlinskii':
-        return _fit_play_stack(recordings)
     if model not in FAMILIES:
-        known = ', '.join([*FAMILIES, 'prandtl_ishlinskii'])
-        raise InputError(f'unknown model {model!r}: choose one of {known}')
+        raise InputError(f'unknown model {model!r}: choose one of {", ".join(FAMILIES)}')
     family = FAMILIES[model]
     starts = [k for k, recording in enumerate(recordings) if not recording.rested]
     size = len(family.shape_bounds)
@@ -234,11 +153,11 @@ def fit_model(recordings: Sequence[Recording], seed: int = 0, model: str = 'bouc
         ]
 
     def cost(x: Array) -> float:
-        return _linear_part(family, recordings, memories(x))[1]
+        return _linear_part(recordings, memories(x))[1]
 
     # For given shape and initial memory, the gain, the lag and an offset for each recording enter
     # linearly and follow from bounded least squares (variable projection, Golub and Pereyra 1973):
-    # one to six unknowns are left. Differential evolution (Storn and Price 1997) needs no start and
+    # two or three are left. Differential evolution (Storn and Price 1997) needs no start and
     # does not stay in the local minima that sharpness and travel make; L-BFGS-B then refines it.
     found = differential_evolution(
         cost,
@@ -248,7 +167,7 @@ def fit_model(recordings: Sequence[Recording], seed: int = 0, model: str = 'bouc
         maxiter=60,
         tol=1e-5,
     )
-    factors, _ = _linear_part(family, recordings, memories(found.x))
+    factors, _ = _linear_part(recordings, memories(found.x))
     first = np.zeros(len(recordings))
     first[starts] = found.x[size:]
     bare = family.build(found.x[:size], factors, 0.0)
@@ -263,33 +182,6 @@ def fit_model(recordings: Sequence[Recording], seed: int = 0, model: str = 'bouc
     return ModelFit(parameters, float(np.sqrt(spread)), int(found.nfev), model, offset)
 
 
-def _fit_play_stack(recordings: Sequence[Recording]) -> ModelFit:
-    reach = max(float(np.max(np.abs(r.driver))) for r in recordings)
-    thresholds = reach * np.arange(ELEMENTS) / ELEMENTS
-    columns = []
-    for r in recordings:
-        # What was before the recording is taken to be the way back from its far side.
-        rest = r.driver[0] if not r.rested else 0.0
-        columns.append(play_states(thresholds, r.driver, np.full(ELEMENTS, rest)))
-    matrix = np.concatenate([r.centred(c) for r, c in zip(recordings, columns, strict=True)])
-    target = np.concatenate([r.centred(r.actual) for r in recordings])
-    low = np.zeros(ELEMENTS)
-    low[0] = SMALLEST_FIRST_WEIGHT
-    found = lsq_linear(matrix, target, (low, np.full(ELEMENTS, GREATEST_ALPHA)))
-    weights = np.clip(found.x, low, GREATEST_ALPHA)
-    weights *= min(1.0, GREATEST_ALPHA / float(np.sum(weights)))
-    weights[0] = max(weights[0], SMALLEST_FIRST_WEIGHT, SMALLEST_ALPHA - float(np.sum(weights[1:])))
-    # The floor of the first may have lifted the sum again.
-    weights[1:] *= min(1.0, (GREATEST_ALPHA - weights[0]) / max(float(np.sum(weights[1:])), 1e-9))
-    rmse = float(np.sqrt(np.mean((target - matrix @ weights) ** 2)))
-    left = [r.actual - c @ weights for r, c in zip(recordings, columns, strict=True)]
-    offset = float(np.clip(_mean_offset(recordings, left), -GREATEST_OFFSET, GREATEST_OFFSET))
-    parameters = PrandtlIshlinskiiParameters(
-        tuple(thresholds.tolist()), tuple(weights.tolist()), offset
-    )
-    return ModelFit(parameters, rmse, 1, 'prandtl_ishlinskii', offset)
-
-
 def _mean_offset(recordings: Sequence[Recording], residuals: Sequence[Array]) -> float:
     means = [
         np.mean(residual if r.scored is None else residual[r.scored])
@@ -298,17 +190,15 @@ def _mean_offset(recordings: Sequence[Recording], residuals: Sequence[Array]) ->
     return float(np.mean(means))
 
 
-def _linear_part(
-    family: ModelFamily, recordings: Sequence[Recording], memories: Sequence[Array]
-) -> tuple[Array, float]:
-    """Best factors and the mean square that they leave."""
-    columns = [family.columns(r.driver, y) for r, y in zip(recordings, memories, strict=True)]
+def _linear_part(recordings: Sequence[Recording], memories: Sequence[Array]) -> tuple[Array, float]:
+    """Best gain and lag, and the mean square that they leave."""
+    columns = [np.stack([r.driver, -y], axis=1) for r, y in zip(recordings, memories, strict=True)]
     target = np.concatenate([r.centred(r.actual) for r in recordings])
     matrix = np.concatenate([r.centred(c) for r, c in zip(recordings, columns, strict=True)])
     gram = matrix.T @ matrix + 1e-12 * np.eye(matrix.shape[1])
     side = matrix.T @ target
     solution = np.linalg.solve(gram, side)
-    low, high = np.array(family.linear_bounds).T
+    low, high = np.array((ALPHA_BOUNDS, LAG_BOUNDS)).T
     if np.any(solution < low) or np.any(solution > high):
         root = np.linalg.cholesky(gram).T
         solution = lsq_linear(root, np.linalg.solve(root.T, side), (low, high)).x

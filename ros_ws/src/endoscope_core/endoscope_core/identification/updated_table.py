@@ -17,13 +17,7 @@ from endoscope_core.choices import PHYSICAL
 from endoscope_core.control.feedforward import LawParameters
 from endoscope_core.control.internal_model import PhysicalParameters
 from endoscope_core.errors import FileError, InputError
-from endoscope_core.hysteresis import (
-    AsymmetricBoucWenParameters,
-    BoucWenParameters,
-    DahlParameters,
-    PlayParameters,
-    PrandtlIshlinskiiParameters,
-)
+from endoscope_core.hysteresis import BoucWenParameters, DahlParameters
 from endoscope_core.hysteresis.inverse import MODELS
 from endoscope_core.physics import JointParameters
 from endoscope_core.physics.family import SIGNED
@@ -61,25 +55,6 @@ def blend(first: LawParameters, second: LawParameters, weight: float) -> LawPara
             _dahl_point(first), _dahl_point(second), weight
         )
         return DahlParameters(alpha, lag, _travel(lag, 2.0**exponent, steepness), exponent, offset)
-    if isinstance(first, PlayParameters) and isinstance(second, PlayParameters):
-        alpha, lag, steepness, offset = _between(
-            (first.alpha, first.lag, first.lag / first.travel, first.offset),
-            (second.alpha, second.lag, second.lag / second.travel, second.offset),
-            weight,
-        )
-        return PlayParameters(alpha, lag, _travel(lag, 1.0, steepness), offset)
-    if isinstance(first, AsymmetricBoucWenParameters) and isinstance(
-        second, AsymmetricBoucWenParameters
-    ):
-        return _asymmetric(_between(_asymmetric_point(first), _asymmetric_point(second), weight))
-    if isinstance(first, PrandtlIshlinskiiParameters) and isinstance(
-        second, PrandtlIshlinskiiParameters
-    ):
-        return PrandtlIshlinskiiParameters(
-            tuple(_between(first.thresholds, second.thresholds, weight)),
-            tuple(_between(first.weights, second.weights, weight)),
-            _between((first.offset,), (second.offset,), weight)[0],
-        )
     if isinstance(first, PhysicalParameters) and isinstance(second, PhysicalParameters):
         return PhysicalParameters(blend_joints(first.joint, second.joint, weight))
     raise ValueError(f'{type(first).__name__} and {type(second).__name__} cannot be blended')
@@ -120,39 +95,6 @@ def _bouc_wen_point(p: BoucWenParameters) -> Point:
 
 def _dahl_point(p: DahlParameters) -> Point:
     return p.alpha, p.lag, p.inverse_slope * p.alpha - 1.0, p.exponent, p.offset
-
-
-def _asymmetric_point(p: AsymmetricBoucWenParameters) -> Point:
-    widest = p.lag + 1.75 * abs(p.skew)
-    return (
-        p.alpha,
-        p.lag,
-        p.skew,
-        p.offset,
-        max(1.0, 1.0 + p.rho_up) * widest / p.travel_up,
-        p.rho_up,
-        p.n_up,
-        max(1.0, 1.0 + p.rho_down) * widest / p.travel_down,
-        p.rho_down,
-        p.n_down,
-    )
-
-
-def _asymmetric(point: list[float]) -> AsymmetricBoucWenParameters:
-    alpha, lag, skew, offset, steep_up, rho_up, n_up, steep_down, rho_down, n_down = point
-    widest = lag + 1.75 * abs(skew)
-    return AsymmetricBoucWenParameters(
-        alpha,
-        lag,
-        skew,
-        offset,
-        _travel(widest, max(1.0, 1.0 + rho_up), steep_up),
-        rho_up,
-        n_up,
-        _travel(widest, max(1.0, 1.0 + rho_down), steep_down),
-        rho_down,
-        n_down,
-    )
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,14 @@ are looked for in ``data/kaist`` of the folder that ENDOSCOPE_SHARED names.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from endoscope_core.identification import ModelFit, Recording, fit_model
+from endoscope_core.identification import Recording, fit_model
 from endoscope_core.identification.family_fit import (
     ACTUAL,
     CYCLE_S,
@@ -105,25 +105,27 @@ def closed_cycle(driver: Array, actual: Array) -> Recording:
     return Recording(np.tile(driver, 2), np.tile(actual, 2), scored=scored)
 
 
-def fit_first_cycle(recording: RealRecording, model: str, seed: int) -> ModelFit:
-    first = recording.within(0.0, CYCLE_S)
-    return fit_model([closed_cycle(recording.desired[first], recording.actual[first])], seed, model)
-
-
 def models_on_real_recordings(
-    recordings: Sequence[RealRecording], model: str, seed: int
+    recordings: Sequence[RealRecording], predicted: Callable[[Recording, Array], Array]
 ) -> dict[int, tuple[float, float]]:
-    """RMSE in rad on the first cycle, which was fitted, and on the second, by the tube's bend."""
+    """RMSE in rad on the first cycle, which was fitted, and on the second, by the tube's bend.
+
+    `predicted` fits a model to a recording, and says its actual angle (N,) for a driving one, rad.
+    """
     found = {}
     for recording in recordings:
-        error = fit_first_cycle(recording, model, seed).predict(recording.desired)
-        error = error - recording.actual
         first = recording.within(0.0, CYCLE_S)
         second = recording.within(CYCLE_S, 2.0 * CYCLE_S)
-        found[recording.bend] = tuple(
-            float(np.sqrt(np.mean(error[part] ** 2))) for part in (first, second)
-        )
-    return {bend: (pair[0], pair[1]) for bend, pair in found.items()}
+        cycle = closed_cycle(recording.desired[first], recording.actual[first])
+        error = predicted(cycle, recording.desired) - recording.actual
+        fitted, judged = (float(np.sqrt(np.mean(error[part] ** 2))) for part in (first, second))
+        found[recording.bend] = fitted, judged
+    return found
+
+
+def hysteresis_model(model: str, seed: int) -> Callable[[Recording, Array], Array]:
+    """A model of the papers, for `models_on_real_recordings`."""
+    return lambda recording, driver: fit_model([recording], seed, model).predict(driver)
 
 
 def tension_loop_width(

@@ -15,7 +15,6 @@ from endoscope_core.control import (
     DesiredMotion,
     Feedforward,
     FeedforwardLaw,
-    RecursiveHysteresisController,
     TrackerMeasurement,
     bending_range,
 )
@@ -62,7 +61,6 @@ def run_tracking_trial(
     law: FeedforwardLaw,
     feedback: bool,
     seed: int,
-    controller: AdaptiveBacklashController | RecursiveHysteresisController | None = None,
 ) -> TrackingTrial:
     """Drive every joint of a rig along a signal; feedback is by the tracker's noisy readings."""
     rig, sensors = PlantSimulator(plant, TICK), SensorModel(plant.sensors, seed)
@@ -70,11 +68,9 @@ def run_tracking_trial(
     gear = shipped_limits().gear
     motion, feedforward = DesiredMotion(joints), Feedforward(joints)
     feedforward.select(law)
-    # In mode 'adaptive_physical' the law learns from them, otherwise the controller, by default the
-    # adaptive law of the second paper.
+    # In mode 'adaptive_physical' the law learns from them, otherwise the controller.
     learns = law.mode == ADAPTIVE_PHYSICAL
-    if controller is None:
-        controller = AdaptiveBacklashController(joints)
+    controller = AdaptiveBacklashController(joints)
     if feedback and not learns:
         controller.activate()
     tracked_every = round(1.0 / (plant.sensors.tracker_rate * TICK))

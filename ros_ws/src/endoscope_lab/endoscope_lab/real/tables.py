@@ -16,6 +16,7 @@ from endoscope_explain.report.numbers import PLANTS as LABEL
 from endoscope_explain.report.numbers import digits, in_degrees
 from endoscope_lab.bench import report, table_head, table_row
 from endoscope_lab.papers.real_recordings import models_on_real_recordings, real_recordings
+from endoscope_lab.real import prandtl_ishlinskii
 from endoscope_lab.real.explained import (
     Number,
     State,
@@ -45,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
         tubes = explained_tubes(args.folder, args.jobs, report)
         state = explained_state(args.folder, tubes, args.jobs, report)
         unknown = unknown_tubes(args.folder, tubes, report)
-        box = models_on_real_recordings(real_recordings(args.folder), 'prandtl_ishlinskii', 0)
+        box = models_on_real_recordings(real_recordings(args.folder), prandtl_ishlinskii.fitted)
         parts = sections(
             tubes,
             numbers(tubes.explained, args.jobs),

@@ -3,13 +3,7 @@
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 
-from endoscope_core.choices import ADAPTIVE, RECURSIVE_LEAST_SQUARES
-from endoscope_core.control import (
-    AdaptiveBacklashController,
-    DesiredMotion,
-    RecursiveHysteresisController,
-    TrackerMeasurement,
-)
+from endoscope_core.control import AdaptiveBacklashController, DesiredMotion, TrackerMeasurement
 from endoscope_core.safety import CommandGate, CommandLimits, Refusal
 from endoscope_nodes import names
 from endoscope_nodes.client.calibration_result import findings_of
@@ -22,12 +16,6 @@ from endoscope_nodes.runtime.streams import JointPublisher, JointSample
 from endoscope_nodes.runtime.ticker import TICK_S
 from endoscope_nodes.safety.sessions import CommandInput, SessionWatch
 from endoscope_nodes.safety.streams import CommandReport, StreamWatch
-
-Controller = AdaptiveBacklashController | RecursiveHysteresisController
-LAWS: dict[str, type[Controller]] = {
-    ADAPTIVE: AdaptiveBacklashController,
-    RECURSIVE_LEAST_SQUARES: RecursiveHysteresisController,
-}
 
 _NOTHING = np.zeros(len(names.JOINTS))
 
@@ -43,8 +31,9 @@ class ControllerNode(EndoscopeNode):
         super().__init__('controller', context)
         p = self.parameters(ControllerParameters, self._on_parameters)
         self._settings = p
-        self._law = p.law
-        self.controller = self._new_controller()
+        self.controller = AdaptiveBacklashController(
+            len(names.JOINTS), stale_after=p.tracker_timeout, fade_time=p.fade_time
+        )
         # Loads what is compiled now, which the second step needs: no command must wait for it.
         trial = AdaptiveBacklashController(len(names.JOINTS))
         for time in (0.0, 1e-3):
@@ -68,13 +57,6 @@ class ControllerNode(EndoscopeNode):
         self.create_subscription(DiagnosticArray, names.CALIBRATION_RESULT, self._on_result, RESULT)
         self.diagnostics.add('commands', CommandReport(self._gate, self.ticker))
         self.diagnostics.add('feedback', self._report)
-
-    def _new_controller(self) -> Controller:
-        return LAWS[self._law](
-            len(names.JOINTS),
-            stale_after=self._settings.tracker_timeout,
-            fade_time=self._settings.fade_time,
-        )
 
     def _on_parameters(self, parameters: ControllerParameters) -> None:
         self._settings = parameters
@@ -114,11 +96,7 @@ class ControllerNode(EndoscopeNode):
 
     def _choose_whether_to_act(self) -> None:
         calibrating = self._calibration.heard(self._timeout_ns)
-        changing = self._settings.law != self._law
-        if changing and self.controller.faded:
-            self._law, changing = self._settings.law, False
-            self.controller = self._new_controller()
-        if self._settings.active and not calibrating and not changing:
+        if self._settings.active and not calibrating:
             self.controller.activate()
         else:
             self.controller.deactivate()
@@ -139,7 +117,6 @@ class ControllerNode(EndoscopeNode):
         values: dict[str, object] = {
             'published': self._corrections.count,
             'weight': controller.weight,
-            'law': self._law,
             'measurements refused': controller.refused,
         }
         for joint, (gain, backlash) in zip(names.JOINTS, controller.learnt, strict=True):

@@ -238,13 +238,6 @@ class ControllerParameters:
     active: bool = parameter(
         True, 'whether to learn and correct while the tracker is fresh', dynamic=True
     )
-    law: str = parameter(
-        choices.ADAPTIVE,
-        "how to learn: the second paper's adaptive law, or recursive least squares; a change "
-        'takes place once the correction has faded out',
-        choices=choices.FEEDBACK_LAWS,
-        dynamic=True,
-    )
     tracker_timeout: float = parameter(
         0.15,
         'silence of the tracker after which the correction fades out',
