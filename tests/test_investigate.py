@@ -137,6 +137,9 @@ def test_an_interruption_pauses_the_graph(motion, tmp_path):
         assert client.state == 'PAUSED'
         live.advance(0.5)
         assert read_parameter(client, 'console.source').value == 'none'
+        # It is continued from there.
+        client.serve = inner
+        MotionPlayer(client, lambda words: True).play(*motion, tmp_path / 'again')
     assert open_bag(tmp_path / 'bag').joint_state(SLAVE_COMMAND).stamp_ns.size
 
 

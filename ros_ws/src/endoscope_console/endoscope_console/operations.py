@@ -63,6 +63,7 @@ class Operations:
         self.playing = Playing(self.graph, self._place, self._ask, self.soon)
         self._holder = Holder()
         self._halts = 0
+        self._why_halted = ''
         self._consented: Client | None = None
         self._closing = False
         self._tasks: set[asyncio.Task[None]] = set()
@@ -240,7 +241,7 @@ class Operations:
 
     def _lost(self, holder: str, to: Client) -> None:
         """Tell an operator that another took the lease."""
-        self._end_what_moves(holder)
+        self._end_what_moves(holder, 'another took the controls')
         lost = self.clients.by_id(holder)
         if lost is not None:
             lost.tell({'op': 'lost', 'by': to.label, 'why': f'{to.label} took the controls'})
@@ -253,15 +254,15 @@ class Operations:
         return ''
 
     def _lease_ended(self, client: Client, why: str) -> None:
-        self._end_what_moves(client.id)
+        self._end_what_moves(client.id, f'its operator lost the controls: {why}')
         self._holder = Holder()
         self._tell_beat()
         self.graph.log('lease', client.id, client.address, True, f'ended: {why}')
         self.soon(self._give_back())
 
-    def _end_what_moves(self, holder: str) -> None:
+    def _end_what_moves(self, holder: str, why: str) -> None:
         """Let nothing that an operator has begun or asked for go on without him."""
-        self._halts += 1
+        self._count_halt(why)
         # He may hold the lease again before the next beat looks.
         self.beat.refuse(holder, Reason.LOST, time.monotonic_ns())
         if self._holder.moves:
@@ -290,7 +291,7 @@ class Operations:
         graph = self.graph.client
         if command in orders.HALTS:
             # At once: no thread has to be free for it, and what was asked for before is over.
-            self._halts += 1
+            self._count_halt(f'a person asked for {command}')
             graph.order(command)
             return await self._ask(partial(graph.ask, command, PATIENCE_S))
         if self.playing.prepares:
@@ -300,10 +301,13 @@ class Operations:
             return await self._moving(command, partial(graph.home, PATIENCE_S, withdrawn))
         return await self._ask(partial(graph.ask_and_see, command, PATIENCE_S, withdrawn))
 
-    def _withdrawn(self) -> Callable[[], bool]:
-        """Whether something has ended motion since now."""
+    def _count_halt(self, why: str) -> None:
+        self._halts, self._why_halted = self._halts + 1, why
+
+    def _withdrawn(self) -> Callable[[], str]:
+        """What has ended motion since now, in words; empty for nothing."""
         halts = self._halts
-        return lambda: self._halts != halts
+        return lambda: '' if self._halts == halts else self._why_halted
 
     async def _moving(self, what: str, move: Callable[[], str]) -> str:
         """Have the slave moved, for as long as the client operates."""
@@ -321,7 +325,7 @@ class Operations:
             holder.waits = False
         return told
 
-    def _calibrate(self, withdrawn: Callable[[], bool]) -> str:
+    def _calibrate(self, withdrawn: Callable[[], str]) -> str:
         if withdrawn():
             raise EndoscopeError('calibration was withdrawn before it began')
         client = self.graph.client
@@ -375,7 +379,7 @@ class Operations:
     async def _play_asked(self, motion: AskedMotion, ask: AskOperator) -> None:
         """Have a motion played under the hand of whoever consents to it."""
 
-        def begins() -> tuple[Holder, Callable[[], bool]]:
+        def begins() -> tuple[Holder, Callable[[], str]]:
             if self._consented is not self.holder or not self._place.speaks:
                 raise NotPlayedError('whoever consented has lost the controls')
             self._require_rest()
@@ -385,7 +389,7 @@ class Operations:
 
     def _halt(self) -> None:
         """End what an investigation moves."""
-        self._halts += 1
+        self._count_halt('a person ended it')
         if self.graph.client.state == 'ENABLED':
             self.graph.client.order('pause')
 

@@ -34,8 +34,8 @@ class Holder:
     waits: bool = False
 
 
-Begins = Callable[[], tuple[Holder, Callable[[], bool]]]
-"""Whose motion it is that begins now, and whether it has been withdrawn since."""
+Begins = Callable[[], tuple[Holder, Callable[[], str]]]
+"""Whose motion it is that begins now, and why it has been withdrawn since, if it has."""
 
 
 @dataclass
@@ -127,15 +127,15 @@ class Playing:
     async def motion(self, motion: AskedMotion, consent: Consent, begins: Begins) -> None:
         """Have a motion that is asked for played and recorded, as a `MotionPlayer` does."""
         loop = asyncio.get_running_loop()
-        begun: list[Callable[[], bool]] = []
+        begun: list[Callable[[], str]] = []
         async with AsyncExitStack() as held:
 
             async def consented(words: str) -> bool:
                 if not await consent(words):
                     return False
                 await held.enter_async_context(self._place.lock)
-                holder, is_withdrawn = begins()
-                begun.append(is_withdrawn)
+                holder, why_withdrawn = begins()
+                begun.append(why_withdrawn)
                 holder.moves, holder.waits = _INVESTIGATION, True
                 self.investigates = True
                 held.callback(self._has_ended, holder)
@@ -145,7 +145,7 @@ class Playing:
                 self._graph.client,
                 lambda words: asyncio.run_coroutine_threadsafe(consented(words), loop).result(),
                 hold_to_play=True,
-                withdrawn=lambda: any(is_withdrawn() for is_withdrawn in begun),
+                withdrawn=lambda: next(filter(None, (why() for why in begun)), ''),
                 plants=self._graph.plants,
             )
             await self._ask(partial(player.play, motion, motion.file, motion.bag, motion.plant))

@@ -3,12 +3,13 @@
 import dataclasses
 import json
 from functools import partial
+from importlib.metadata import version
 
 import numpy as np
 import pytest
 
-from endoscope_core.errors import InputError, NotPlayedError, RigStoppedError
-from endoscope_core.investigation_folder import LOG, held, is_left_behind
+from endoscope_core.errors import EndoscopeError, InputError, NotPlayedError, RigStoppedError
+from endoscope_core.investigation_folder import LOG, PAGE, held, is_left_behind
 from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
 from endoscope_core.physics.plant_file import load_plant, save_plant
 from endoscope_core.rig import shipped_rig
@@ -16,6 +17,7 @@ from endoscope_core.signals import hold, move, sequence
 from endoscope_core.signals.command_file import JOINTS, CommandTable, read_command_file
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.explanation import Estimate, Verdict
+from endoscope_explain.investigation import page
 from endoscope_explain.investigation.investigation import (
     Investigation,
     investigate,
@@ -171,18 +173,39 @@ def test_a_fault_ends_it_with_what_is_known_and_it_is_continued(both, stribeck_c
     assert again.stopped is Stop.ONE_CLASS
 
 
-def test_ctrl_c_loses_nothing(both, stribeck_case):
+@pytest.mark.parametrize(
+    ('error', 'stopped', 'words'),
+    [
+        (KeyboardInterrupt(), 'interrupted', 'It was interrupted: asked for by Ctrl-C'),
+        (EndoscopeError('timed out'), 'failed', 'It could not go on: timed out.'),
+    ],
+)
+def test_what_breaks_off_loses_nothing_and_is_called_what_it_was(
+    both, stribeck_case, error, stopped, words
+):
     def interrupted(motion, file, bag):
         if bag.name == 'bag_2':
-            raise KeyboardInterrupt
+            raise error
         bag.mkdir()
 
-    with pytest.raises(KeyboardInterrupt):
-        investigate(both, interrupted, lambda bags: stribeck_case)
+    with pytest.raises(type(error)):
+        investigate(
+            both,
+            interrupted,
+            lambda bags: stribeck_case,
+            page=lambda log: page.page(log, both.folder),
+        )
     kept = log_of(both.folder)
-    assert kept['stopped'] == 'interrupted'
+    assert kept['stopped'] == stopped
     assert kept['rounds'][0]['answer']['names'][0]['id'] == 'stribeck_friction'
-    assert kept['rounds'][1]['ended']
+    assert kept['rounds'][0]['answer']['places']
+    assert kept['rounds'][1]['ended'].startswith(words)
+    assert begun(both.folder, both.plant_file).rounds[1].ended.startswith(words)
+    html = (both.folder / PAGE).read_text()
+    assert words in html
+    assert 'solid var(--finding)' in html
+    assert f'Next: <code>endoscope operate adopt {both.folder / PLANT}' in html
+    assert f'endoscope {version("endoscope_explain")}' in html
 
 
 def test_numbers_that_an_effect_may_stand_for_are_asked_about(both, told):
@@ -224,7 +247,7 @@ def test_a_comparison_that_nobody_wants_leaves_what_is_known(both, told):
     assert log.untracked == 'the motion was not wanted'
     ((words, file, plant),) = asked
     assert file == 'held_out.csv'
-    assert 'Held-out motion of bend_x and bend_y, 16 s' in words
+    assert 'Held-out motion of bend_x and bend_y, 20 s' in words
     assert plant == both.plant_file
     assert 'not measured: the motion was not wanted' in (both.folder / LOG_MD).read_text()
 
@@ -257,7 +280,8 @@ def test_a_folder_is_one_programs_until_that_is_gone(both, stribeck_case):
         assert left(both.folder)
     assert left(elsewhere)
     dataclasses.replace(log.with_last(recorded=False), stopped=None).write(both.folder)
-    assert begun(both.folder, both.plant_file).rounds[-1].ended == 'the program was killed.'
+    ended = begun(both.folder, both.plant_file).rounds[-1].ended
+    assert ended.startswith('the program was killed')
 
 
 def test_another_plant_or_a_folder_of_something_else_is_refused(both, tmp_path, stribeck_case):

@@ -94,7 +94,9 @@ class OperatingStateMachine:
             )
         if self.state not in _ALLOWED[command]:
             extra = f' ({self.cause}); use enable once the cause is gone' if self.cause else ''
-            return Answer(False, f"'{command}' is not possible in {self.state}{extra}", WRONG_STATE)
+            possible = ', '.join(c for c in StateCommand if self.state in _ALLOWED[c])
+            words = f"'{command}' is not possible in {self.state}{extra}; possible are {possible}"
+            return Answer(False, words, WRONG_STATE)
         if command is StateCommand.HOME:
             return Answer(True)
         state = _LEADS_TO[command]

@@ -30,7 +30,7 @@ from endoscope_explain.investigation.motions import (
 from endoscope_explain.investigation.tracking import PlayThrough, held_out, with_tracking
 from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
 from endoscope_explain.report.numbers import shown
-from endoscope_explain.report.sentences import verdict_sentence
+from endoscope_explain.report.sentences import verdict_sentence, where
 from endoscope_explain.takes import inputs_joined
 
 EXPERIMENTS = 4
@@ -82,7 +82,7 @@ def investigate(
     for.
 
     What is known is in the folder after every step. Interruption and a fault of the rig end it with
-    that; Ctrl-C is raised again afterwards, and so is an error of `explain`.
+    that, and so do Ctrl-C and any other error, which are raised again afterwards.
     """
     running = _Running(
         investigation, logs.begun(investigation.folder, investigation.plant_file), page, say
@@ -105,6 +105,9 @@ def investigate(
         running.end(Stop.INTERRUPTED, str(error))
     except (KeyboardInterrupt, SystemExit):
         running.end(Stop.INTERRUPTED, 'asked for by Ctrl-C or a signal')
+        raise
+    except Exception as error:
+        running.end(Stop.FAILED, str(error) or type(error).__name__)
         raise
     return running.log
 
@@ -198,7 +201,7 @@ class _Running:
         """Note why it ends, and of a motion that was under way, that it is not whole."""
         sentence = f'{logs.STOP_WORDS[stop]}: {words.rstrip(".")}.'
         log = self.log
-        if log.rounds and not log.rounds[-1].recorded and stop in (Stop.FAULT, Stop.INTERRUPTED):
+        if log.rounds and not log.rounds[-1].recorded and stop in logs.CUT_SHORT:
             log = log.with_last(ended=sentence)
         self.keep(log.ended(stop, sentence))
         self.say(sentence)
@@ -218,7 +221,8 @@ def answer_of(case: ExplainedCase, seconds: float) -> Answer:
         Name(NUMBERS, joint, rivals, '') for joint, rivals in case.explanation.instead.items()
     ]
     sentence = verdict_sentence(case)
-    return Answer(str(case.verdict), sentence, tuple(names), worst[0], worst[1], seconds)
+    places = tuple(where(place) for place in case.places)
+    return Answer(str(case.verdict), sentence, tuple(names), worst[0], worst[1], seconds, places)
 
 
 def _strength(effect: NamedEffect) -> str:

@@ -27,9 +27,11 @@ class Stop(StrEnum):
     USED_UP = 'experiments_used_up'
     INTERRUPTED = 'interrupted'
     FAULT = 'fault'
+    FAILED = 'failed'
 
 
-GOES_ON = (Stop.INTERRUPTED, Stop.FAULT, Stop.USED_UP)
+CUT_SHORT = (Stop.INTERRUPTED, Stop.FAULT, Stop.FAILED)
+GOES_ON = (*CUT_SHORT, Stop.USED_UP)
 """After these an investigation may be continued."""
 STOP_WORDS = {
     Stop.ONE_CLASS: 'One class is left',
@@ -37,6 +39,7 @@ STOP_WORDS = {
     Stop.USED_UP: 'The experiments are used up',
     Stop.INTERRUPTED: 'It was interrupted',
     Stop.FAULT: 'The rig stopped it',
+    Stop.FAILED: 'It could not go on',
 }
 
 
@@ -62,6 +65,7 @@ class Answer:
     described: float | None
     improved: float | None
     seconds: float  # that explaining took
+    places: tuple[str, ...] = ()  # where the described plant fails, and in which regime
 
 
 @dataclass(frozen=True)
@@ -165,7 +169,7 @@ def begun(folder: Path, plant: Path) -> Log:
         raise InputError(f'{folder} is at its end: {log.words} Name another folder')
     log = replace(log, stopped=None, words='')
     if log.rounds and not (log.rounds[-1].recorded or log.rounds[-1].ended):
-        return log.with_last(ended='the program was killed.')
+        return log.with_last(ended='the program was killed, or its machine stopped.')
     return log
 
 
@@ -276,6 +280,7 @@ def answered(answer: Answer) -> Sequence[str]:
         told = f'not told from {others}' if others else 'told from all others'
         strength = f', {name.strength}' if name.strength else ''
         lines.append(f'{name.id} of {name.joint}{strength}: {told}.')
+    lines += [f'Where: {place}.' for place in answer.places]
     if answer.described is not None and answer.improved is not None:
         lines.append(
             f'The worst signal is off by {answer.described:.3g} times its noise with the described '

@@ -1,11 +1,14 @@
 """index.html: what is known of a rig, and the motions that it was asked for."""
 
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
 from endoscope_core.signals.command_file import JOINTS, read_command_file
 from endoscope_explain.investigation.log import (
+    CUT_SHORT,
+    PLANT,
     Answer,
     Log,
     answered,
@@ -30,7 +33,9 @@ def page(log: Log, folder: Path) -> str:
         'report/templates/investigation.html.j2',
         log=log,
         headline='Nothing is known yet' if answer is None else answer.sentence,
-        ended=log.stopped is not None,
+        mood='quiet' if log.stopped is None else 'finding' if log.stopped in CUT_SHORT else 'good',
+        version=version('endoscope_explain'),
+        improved=folder / PLANT,
         answer=answer,
         names='' if answer is None else _names(answer),
         lines=[] if answer is None else answered(answer)[1 + len(answer.names) :],

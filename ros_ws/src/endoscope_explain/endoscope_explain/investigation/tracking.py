@@ -13,7 +13,7 @@ from endoscope_core.errors import NotPlayedError
 from endoscope_core.metrics import tracking_rmse
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.rig import Rig
-from endoscope_core.signals import non_periodic_signal
+from endoscope_core.signals import move, non_periodic_signal, sequence
 from endoscope_core.signals.command_file import (
     JOINTS,
     CommandTable,
@@ -31,9 +31,9 @@ Array = NDArray[np.float64]
 HELD_OUT = 'held-out motion'
 FILE = 'held_out.csv'
 DURATION_S = 15.0
-SETTLED_S = 3.0
-"""From where on errors count: a plant that is adopted moves nothing, and what it changes is worked
-off while the desired angle moves."""
+LEAD_S = 4.0
+"""Before errors count, the tip goes as far to either side as it will, so that play and friction are
+where the same way has led them, whatever was before and whichever plant is inverted."""
 SHARE = 0.5
 """Of the largest angle of the commissioning motion: what compensation adds to it stays within what
 the rig has been through."""
@@ -46,24 +46,28 @@ PlayThrough = Callable[[Motion, Path, Path, Path], None]
 class Tracked:
     """A motion as it was asked for and as the tip made it."""
 
-    time: Array  # (N,), s since the motion began
+    time: Array  # (N,), s since the motion began, which is led into for `LEAD_S`
     desired: Array  # (N, J), rad
     tip: Array  # (N, J), rad
 
     @property
     def rmse(self) -> float:
-        """In rad, over all joints, once settled."""
-        settled = self.time >= SETTLED_S
-        return tracking_rmse(self.desired[settled], self.tip[settled])
+        """In rad, over all joints."""
+        return tracking_rmse(self.desired, self.tip)
 
 
 def held_out(plant: PlantDescription, rig: Rig) -> Motion:
     """A motion of both joints that is among no experiments."""
     first = commissioning(plant, rig)
     signal = non_periodic_signal(DURATION_S)
-    time = np.arange(0.0, signal.duration, SAMPLE_S)
-    angle = np.asarray(signal(time)[0])
-    angle *= SHARE * first.largest / float(np.abs(angle).max())
+    time = np.arange(0.0, LEAD_S + signal.duration, SAMPLE_S)
+    lead = time < LEAD_S
+    angle = np.asarray(signal(time[~lead] - LEAD_S)[0])
+    largest = SHARE * first.largest
+    angle *= largest / float(np.abs(angle).max())
+    parts = [move(0.0, 1.0, 1.0), move(1.0, -1.0, 2.0), move(-1.0, angle[0] / largest, 1.0)]
+    aside = sequence('to either side', parts)
+    angle = np.concatenate([largest * aside(time[lead])[0], angle])
     columns = [angle if joint in plant.joints else 0.0 * angle for joint in JOINTS]
     table = CommandTable(JOINTS, *as_played(time, np.stack(columns, axis=1), rig))
     why = 'It is among no experiments: it shows what the improved plant is good for.'
@@ -92,7 +96,7 @@ def with_tracking(
 
 
 def tracked(bag: Path, file: Path) -> Tracked:
-    """What a bag has of a motion that a file asks for, by the time of the file.
+    """What a bag has of a motion that a file asks for, by the time of the file, once led into.
 
     BagError if it cannot be read.
     """
@@ -110,5 +114,5 @@ def tracked(bag: Path, file: Path) -> Tracked:
     off = [tracking_rmse(table.angle, desired(table.time + begin)) for begin in begins]
     begin = float(begins[np.argmin(off)])
     since = 1e-9 * (tip.stamp_ns - stream.stamp_ns[0]) - begin
-    inside = (since >= 0.0) & (since <= stamp_s[-1] - begin)
+    inside = (since >= LEAD_S) & (since <= stamp_s[-1] - begin)
     return Tracked(since[inside], desired(since[inside] + begin), tip.require('position')[inside])
