@@ -49,7 +49,7 @@ class SimulatedGraph(ProbedGraph):
     """
 
     def __init__(
-        self, *, without=(), extra=(), overrides=None, rig=None, tick_rate: int = TICK_RATE
+        self, *, without=(), extra=(), overrides=None, rig=None, tick_rate=TICK_RATE, args=()
     ) -> None:
         self.domain = private_domain()
         overrides = overrides or {}
@@ -59,6 +59,7 @@ class SimulatedGraph(ProbedGraph):
             args=[
                 *('--ros-args', '--log-level', 'fatal'),
                 *('-p', 'use_sim_time:=true', '-p', f'tick_rate:={tick_rate}'),
+                *args,
             ],
             context=Context(),
             domain_id=self.domain,

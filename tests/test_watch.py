@@ -1,9 +1,11 @@
 """The watch among the real nodes: quiet on a rig as described, and it tells of one that changes."""
 
 import json
+import re
 
 import numpy as np
 import pytest
+from doc_pages import ROOT, WORKSPACE
 from operated_graph import OperatedGraph
 from sensor_msgs.msg import JointState
 from simulated_graph import SimulatedGraph
@@ -12,9 +14,11 @@ from std_srvs.srv import Trigger
 from endoscope_bags import open_bag
 from endoscope_bags.cdr_encoding import encode_joint_state
 from endoscope_bags.event_bag import event_bags, events_of
+from endoscope_bringup.operating.status import status_of
 from endoscope_core.physics import EffectSpec, PlantDescription, save_plant
 from endoscope_core.signals.command_file import write_command_file
 from endoscope_explain.recording import recording_from_bag
+from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.graph import ALL_NODES
 from endoscope_nodes.names import SLAVE_MEASURED, WATCH_RESTART
 from endoscope_nodes.nodes.watch import WatchNode
@@ -109,7 +113,7 @@ def test_an_adopted_plant_is_the_one_that_is_compared_from_then_on(watched, file
     graph.advance(2.0)
     level, message, values = said(graph.diagnostics['watch: rig'][-1])
     assert level == OK
-    assert message.startswith('learning')
+    assert message.startswith('learning, 0 of 30 s')
     assert values['plant'] == f'adopted plant {json.loads(out)["plant"]}'
     assert float(values['bend_x learnt [s]']) == 0.0
 
@@ -131,6 +135,22 @@ def test_messages_that_are_no_readings_are_counted_and_change_nothing(watched):
     level, _, values = said(graph.diagnostics['watch: rig'][-1])
     assert level == OK
     assert int(values['tracker unreadable']) >= 1
+
+
+def test_it_starts_by_the_documented_line():
+    page = (WORKSPACE / 'doc/operating.md').read_text()
+    [line] = re.findall(r'^\$ graph (.*watch:active.*)$', page, re.MULTILINE)
+    for file in ('docker/compose.yaml', 'ros_ws/src/endoscope_bringup/launch/endoscope.launch.py'):
+        assert 'watch:active:=' in (ROOT / file).read_text()
+    with SimulatedGraph(args=line.split(), extra=(WatchNode,)) as graph:
+        assert graph.nodes['watch'].announcement.startswith('watching for a rig other than')
+        graph.advance(2.0)
+        assert said(graph.diagnostics['watch: rig'][-1])[1].startswith('learning, 0 of 30 s')
+        with GraphClient(graph.probe, graph.advance) as client:
+            client.find(1.0)
+            lines, _ = status_of(client, 3.0)
+    [line] = [line for line in lines if line.startswith('watch ')]
+    assert 'learning, 0 of 30 s' in line
 
 
 def test_by_default_it_is_there_and_hears_nothing():

@@ -23,7 +23,7 @@ from endoscope_nodes.client.graph_listener import (
     Health,
 )
 from endoscope_nodes.client.plant_adoption import PlantInForce
-from endoscope_nodes.names import BAG, WIRES
+from endoscope_nodes.names import BAG, LEARNING, WIRES
 
 _LEVELS = ('ok', 'warning', 'error', 'stale')
 _TENSE = 0.9
@@ -216,6 +216,8 @@ class View:
         ]
         if watch is not None and _LEVELS[_level(watch)] == 'warning':
             found.append((True, Alarm('watch', Level.MEDIUM, watch.message)))
+        elif watch is not None and watch.message.startswith(LEARNING):
+            found.append((True, Alarm('watch', Level.LOW, f'the watch is {watch.message}')))
         if tension is not None and tension[0] > _TENSE * self._rig.tension.ceiling:
             text = f'{tension[1]} is above {_TENSE * self._rig.tension.ceiling:.0f} N'
             found.append((True, Alarm('tension', Level.HIGH, text)))

@@ -67,5 +67,7 @@ TIME, GEAR, REACH, SPEED, CEILING = (
 MARKS, LAST_EVENT = 'marks', 'last bag'
 # What `recorder: recording` says there while it records: where, and whether nobody asked for it.
 BAG, AUTOMATIC = 'bag', 'automatic'
+# What `watch: rig` says there first, until it can judge.
+LEARNING = 'learning'
 # What `console: commands` says there of a motion that it plays.
 FINISHED = 'finished'

@@ -1,6 +1,6 @@
 import pytest
 
-from endoscope_nodes.runtime.declared_parameters import check_sections
+from endoscope_nodes.runtime.declared_parameters import check_sections, given_to_nodes
 from endoscope_nodes.runtime.parameters import ParameterError
 
 HERE = '/endoscope'
@@ -71,18 +71,9 @@ def test_an_empty_file_is_for_nobody(check):
     assert check('') == []
 
 
-@pytest.mark.parametrize(
-    ('rule', 'words'),
-    [
-        ('recorder:bag:=a', "write '/endoscope/recorder'"),
-        ('recoder:bag:=a', "there is no node 'recoder'; did you mean 'recorder'"),
-    ],
-)
-def test_a_rule_for_one_node_is_for_one_without_a_namespace(rule, words):
-    with pytest.raises(ParameterError, match=words):
-        check_sections(['--ros-args', '-p', rule], HERE)
-
-
-def test_a_rule_for_all_nodes_may_have_colons_in_its_value():
-    assert check_sections(['--ros-args', '-p', 'bag:=a:b:=c'], HERE) == []
-    assert check_sections(['--ros-args', '-p', 'recorder:bag:=a'], '/') == []
+def test_a_rule_for_one_node_is_for_it_in_any_namespace():
+    args = ['--ros-args', '-p', 'recorder:bag:=a:b:=c', '-p', 'watch:active:=true', '-p', 'keep:=1']
+    assert given_to_nodes(args) == {'recorder': {'bag': 'a:b:=c'}, 'watch': {'active': True}}
+    assert check_sections(args, HERE) == check_sections(args, '/') == []
+    with pytest.raises(ParameterError, match="there is no node 'recoder'; did you mean 'recorder'"):
+        check_sections(['--ros-args', '-p', 'recoder:bag:=a'], HERE)

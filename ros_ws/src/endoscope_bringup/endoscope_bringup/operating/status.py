@@ -15,6 +15,7 @@ from endoscope_nodes.client.graph_listener import (
     MASTER,
     RECORDER,
     SUPERVISOR,
+    WATCH,
     Health,
 )
 from endoscope_nodes.names import (
@@ -82,6 +83,7 @@ def status_of(client: GraphClient, patience_s: float) -> tuple[tuple[str, ...], 
             else [_NOT_HEARD],
         ),
         *_entry('recorder', [_recorder(recorder)]),
+        *_entry('watch', [health[WATCH].message] if WATCH in health else []),
         *_entry('nodes', (*_nodes(health), *(f'{name:<13} {_NOT_HEARD}' for name in not_heard))),
     )
     return lines, values

@@ -251,7 +251,9 @@ class WatchNode(EndoscopeNode):
         if self.ticker.monotonic_ns() - self._heard_ns > _SILENT_S * _SECOND:
             return STALE, f'nothing is heard of {names.MOTOR_MEASURED}', values
         if not watch.ready:
-            return OK, f'learning: every joint has to move for {_LEARNING_S:.0f} s', values
+            moved = min(_LEARNING_S, BLOCK_S * min(joint.moved for joint in watch.joints))
+            words = f'{names.LEARNING}, {moved:.0f} of {_LEARNING_S:.0f} s: every joint has to move'
+            return OK, words, values
         return OK, f'the rig is as described by {self._source}', values
 
     def close(self) -> None:

@@ -15,7 +15,11 @@ from endoscope_core.physics.effect import Stage
 from endoscope_core.physics.effects import describe
 from endoscope_core.rig import Rig, load_rig
 from endoscope_nodes.names import CLOCK, CLOCK_NODE, JOINTS
-from endoscope_nodes.runtime.declared_parameters import check_sections, declare_parameters
+from endoscope_nodes.runtime.declared_parameters import (
+    check_sections,
+    declare_parameters,
+    given_to_nodes,
+)
 from endoscope_nodes.runtime.eventless_node import EventlessNode
 from endoscope_nodes.runtime.measured_pose import MeasuredPose
 from endoscope_nodes.runtime.node_parameters import BeatParameters, RealTimeParameters
@@ -107,7 +111,8 @@ class NodeContext:
         with self._asked(name) as node:
             # rclpy has no public way to what the command line gave.
             given = node._parameter_overrides  # noqa: SLF001
-            return {key: value.value for key, value in given.items()}
+            values = {key: value.value for key, value in given.items()}
+            return values | given_to_nodes(self._args).get(name, {})
 
     def told(self, name: str, parameter: str) -> object:
         """Value that this process was told to give a node's parameter; None for none."""
@@ -139,6 +144,7 @@ class NodeContext:
         """Parameter values that this process was told to give the node called ``name``."""
         values: dict[str, object] = {'use_sim_time': True} if self.chosen else {}
         values |= self.chosen if name == CLOCK_NODE else {}
+        values |= given_to_nodes(self._args).get(name, {})
         values |= self._overrides.get(name, {})
         return [Parameter(key, value=value) for key, value in values.items()]
 
