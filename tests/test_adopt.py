@@ -101,7 +101,7 @@ def test_a_bag_over_an_adoption_has_both_plants(plants):
     assert told[-1].before == told[0].hash
 
 
-def test_strangers_narrow_plants_and_faults_are_refused(plants):
+def test_strangers_narrow_plants_and_faults_are_refused(plants, monkeypatch):
     told = []
     with OperatedGraph(plants) as graph:
         graph.probe.create_subscription(DiagnosticArray, COMPENSATOR_PLANT, told.append, RESULT)
@@ -117,8 +117,22 @@ def test_strangers_narrow_plants_and_faults_are_refused(plants):
         stranger.publish(AdoptionRequest('1', text, 'of_somebody').message(graph.clock.now_ns))
         graph.advance(0.2)
         assert PlantInForce.of_message(told[-1]).code == 'other_session'
+        # Asked no more before it is in force.
+        for asked in (text, ''):
+            request = AdoptionRequest('2', asked, graph.session)
+            stranger.publish(request.message(graph.clock.now_ns))
+        graph.advance(0.2)
+        assert PlantInForce.of_message(told[-1]).code == 'withdrawn'
+        assert PlantInForce.of_message(told[-1]).hash == ''
         assert refused(graph, plants / 'true.yaml') == 'other_sender'
         graph.probe.destroy_publisher(stranger)
+        graph.connect()
+        with monkeypatch.context() as lost:
+            lost.setattr(AdoptionRequest, 'of_message', lambda message: None)
+            words = ('operate', 'adopt', str(plants / 'true.yaml'))
+            status, _, errors = graph.run(*words, timeout=3)
+        assert status == 1
+        assert 'the plant may still come into force' in errors
         graph.nodes['compensator']._session.leave('the test ends it')  # noqa: SLF001
         graph.advance(0.3)
         assert refused(graph, plants / 'true.yaml') == 'fault'

@@ -114,7 +114,8 @@ def test_a_rejected_home_is_told_and_the_order_underway_is_known(graph):
         assert client.underway.order == 'calibrate'
         graph.command('pause')
         client.wait_for(lambda: client.underway is None, 'the end')
-        with pytest.raises(GraphError, match="'home' is not possible in PAUSED"):
+        out = "'home' is not possible in PAUSED; possible are disable, pause, resume"
+        with pytest.raises(GraphError, match=out):
             client.home(5.0)
 
 
@@ -150,6 +151,23 @@ def test_an_order_to_move_is_not_given_again_after_what_ended_motion(
         with pytest.raises(GraphError, match=said):
             asker.ask_and_see('resume', 5.0, lambda: withdrawn and bool(asker.given))
         assert asker.given == ['resume']
+
+
+def test_patience_is_in_the_graphs_time_and_ends_where_that_stands_still(graph):
+    wall_s = [0.0]
+
+    def live(seconds):
+        wall_s[0] += 20.0 * seconds
+        graph.advance(seconds)
+
+    with GraphClient(graph.probe, live, lambda: wall_s[0]) as client:
+        client.wait_for(lambda: client.graph_ns > 0, 'the supervisor')
+        end_ns = client.graph_ns + 2e9
+        assert client.wait_until(lambda: client.graph_ns >= end_ns, 3.0)
+        assert not client.wait_until(lambda: client.graph_ns >= end_ns + 4e9, 3.0)
+        client.serve, begun_s = lambda seconds: wall_s.append(wall_s.pop() + seconds), wall_s[0]
+        assert not client.wait_until(lambda: False, 3.0)
+        assert wall_s[0] - begun_s == pytest.approx(3.0, abs=0.2)
 
 
 @pytest.mark.parametrize('given', ['abc', '-1', '233'])

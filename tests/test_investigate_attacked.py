@@ -79,6 +79,16 @@ class Attacked(GraphClient):
             happens()
 
 
+def parameters(graph):
+    """What an investigation sets in nodes that it does not ask to stay so."""
+    return {
+        f'{node}.{name}': parameter.value
+        for node in ('compensator', 'controller', 'console')
+        for name, parameter in graph.nodes[node].get_parameters_by_prefix('').items()
+        if not isinstance(parameter.value, list)
+    }
+
+
 def attacked(graph, motion, folder, happens, beside=lambda client: None, **of_player):
     """Play a motion during which something happens; how it ended."""
     graph.command('disable')
@@ -211,6 +221,8 @@ def test_a_program_that_is_killed_moves_nothing_on_and_is_in_no_way(graph, motio
     save_plant(PlantDescription(), tmp_path / 'plant.yaml')
     graph.command('disable')
     graph.advance(0.5)
+    graph.set('console', source='master')
+    before = parameters(graph)
     graph.goals.clear()
     words = ['--plant', str(tmp_path / 'plant.yaml'), '--out', str(tmp_path / 'out')]
     program = OperatedGraph.start(graph, 'investigate', *words, '--attended')
@@ -228,6 +240,12 @@ def test_a_program_that_is_killed_moves_nothing_on_and_is_in_no_way(graph, motio
         program.kill()
         program.communicate()
     assert graph.state == 'ENABLED'
+    changed = dict(set(parameters(graph).items()) - set(before.items()))
+    assert {'compensator.mode', 'controller.active', 'console.source'} <= set(changed)
+    graph.command('disable')
+    graph.advance(0.2)
+    assert parameters(graph) == before
+    graph.set('console', source='none')
     assert stands_still(graph)
     log = json.loads((tmp_path / 'out' / 'log.json').read_text())
     assert [each['recorded'] for each in log['rounds']] == [False]

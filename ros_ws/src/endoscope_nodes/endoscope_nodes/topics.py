@@ -275,8 +275,8 @@ TOPICS = (
         'all but the reach empty where none has been adopted; status `compensator: adoption`, '
         'what became of the last request: `id`, `state` `executing`, `succeeded` or `rejected`, '
         'and `code`: `not_a_plant`, `other_joints`, `not_invertible`, `beyond_range`, `moving`, '
-        '`busy`, `not_measured`, `no_session`, `other_session`, `other_sender` or '
-        '`nothing_to_undo`; the message is the same in words',
+        '`busy`, `not_measured`, `no_session`, `other_session`, `other_sender`, '
+        '`nothing_to_undo` or `withdrawn`; the message is the same in words',
         offered=RESULT,
         asked=RESULT,
         said_by=('compensator',),

@@ -19,3 +19,4 @@ class AdoptionCode(StrEnum):
     OTHER_SESSION = 'other_session'
     OTHER_SENDER = 'other_sender'
     NOTHING_TO_UNDO = 'nothing_to_undo'
+    WITHDRAWN = 'withdrawn'

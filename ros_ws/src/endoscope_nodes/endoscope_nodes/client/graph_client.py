@@ -81,7 +81,7 @@ class GraphClient(GraphListener):
         self,
         command: str,
         patience_s: float = PATIENCE_S,
-        withdrawn: Callable[[], bool] = _never,
+        withdrawn: Callable[[], object] = _never,
     ) -> str:
         """Give a state command and wait for the state that it leads to; that state."""
         target = _OPENS[command]
@@ -99,13 +99,13 @@ class GraphClient(GraphListener):
         self,
         command: str,
         patience_s: float = PATIENCE_S,
-        withdrawn: Callable[[], bool] = _never,
+        withdrawn: Callable[[], object] = _never,
     ) -> str:
         """Give a state command, and see whether the state lasts; that state."""
         state = self.ask(command, patience_s, withdrawn)
         # A node's trouble may come to light at once; its cause follows.
         if state == 'ENABLED' and self.wait_until(lambda: self.state != state, _STEADY_S):
-            self.wait_until(lambda: bool(self.why) or withdrawn(), patience_s)
+            self.wait_until(lambda: bool(self.why or withdrawn()), patience_s)
             raise GraphError(f'{self.state}: {self.why or "asked for meanwhile"}')
         return state
 
@@ -115,14 +115,13 @@ class GraphClient(GraphListener):
         done: Callable[[], bool],
         what: str,
         patience_s: float,
-        withdrawn: Callable[[], bool],
+        withdrawn: Callable[[], object],
     ) -> None:
         """Give a command, again where it brought no answer, until it is done."""
         asked_ns = time.time_ns()
         # A refusal is told until the next one, by a stamp of the supervisor's.
         self.wait_for(lambda: self.graph_ns > 0, 'the supervisor', patience_s)
         graph_ns, begun_in = self.graph_ns, self.state
-        end = self._clock() + patience_s
 
         def is_refused() -> bool:
             said = self.health.get(SUPERVISOR)
@@ -130,23 +129,27 @@ class GraphClient(GraphListener):
                 return False
             return int(said.values[names.REFUSED_NS]) >= graph_ns
 
-        while self._clock() <= end:
+        for _ in range(1 + int(patience_s / _REPEATED_AFTER_S)):
             if withdrawn():
                 raise GraphError(f'{command} was withdrawn before it was answered')
             if command in _TO_MOTION and begun_in and self.state != begun_in:
                 # What has ended motion meanwhile must not be undone by an order from before it.
                 raise GraphError(f'{self.state} instead of {what}: {self.why or "no cause"}')
             self.order(command)
-            if self.wait_until(lambda: done() or is_refused(), _REPEATED_AFTER_S):
+            if self.wait_until(
+                lambda: done() or is_refused() or bool(withdrawn()), _REPEATED_AFTER_S
+            ):
                 if not is_refused():
-                    return None
+                    if done():
+                        return None
+                    continue
                 said = self.health[SUPERVISOR].values
                 if said[names.REFUSAL_CODE] == CAUSES_PRESENT and self._becomes_whole(
                     said[names.REFUSAL]
                 ):
                     return self._ask(command, done, what, patience_s, withdrawn)
                 raise GraphError(said[names.REFUSAL])
-        raise GraphError(f'timed out after {patience_s:g} s waiting for {what}')
+        raise GraphError(f'timed out after {patience_s:g} s{self.pace} waiting for {what}')
 
     def _becomes_whole(self, refused: str) -> bool:
         """Wait where that was the reason of a refusal; whether the streams have come since."""
@@ -179,7 +182,7 @@ class GraphClient(GraphListener):
             raise GraphError(said.message)
         return said.values[names.LAST_EVENT]
 
-    def home(self, patience_s: float = PATIENCE_S, withdrawn: Callable[[], bool] = _never) -> str:
+    def home(self, patience_s: float = PATIENCE_S, withdrawn: Callable[[], object] = _never) -> str:
         """Go home, and wait until the slave is there; what calibration says of it."""
         known = self.known_orders(patience_s)
         what = 'the way home: calibration does not begin it'

@@ -29,8 +29,6 @@ WATCH = 'watch: rig'
 MASTER = f'{names.MASTER_NODE}: commands'
 LOCK_STEP = f'{names.CLOCK_NODE}: lock-step'
 COMMANDS = ('compensator: commands', 'compensator: calibration commands', 'motor_driver: commands')
-# A graph that simulates slower still counts as one that has stopped.
-_SLOWEST = 0.1
 # A loop that reads as seldom as this still hears every word.
 _HEARD = profile(Qos(200))
 _HEARD_LATCHED = profile(Qos(200, latched=True))
@@ -166,6 +164,12 @@ class GraphListener(ClosedOnExit):
         return factor if math.isfinite(factor) else None
 
     @property
+    def pace(self) -> str:
+        """The graph's pace, to be added to a time in its seconds; empty where it is real."""
+        factor = self.factor
+        return '' if factor is None else f" of the graph's time, at {factor:.2g} of real time"
+
+    @property
     def where(self) -> str:
         """Namespace and domain, in words."""
         namespace = self.node.get_namespace()
@@ -178,17 +182,24 @@ class GraphListener(ClosedOnExit):
         return sorted({name for name, space in found if space == namespace and name != own})
 
     def wait_until(self, condition: Callable[[], bool], patience_s: float = PATIENCE_S) -> bool:
-        """Listen until something has come true, or for so long; whether it has."""
-        left_s, before = patience_s, self._clock()
+        """Listen until something has come true, or for so long; whether it has.
+
+        So long is meant in the graph's time where that is slower than real time, however slow; a
+        graph whose time stands still is waited for as long.
+        """
+        begun_s = moved_s = self._clock()
+        self.hear()
+        graph_ns, passed_ns = self.graph_ns, 0
         while True:
             self.hear()
             if condition():
                 return True
             now = self._clock()
-            # What a slow graph says once a second of its time is waited for so much longer.
-            left_s -= (now - before) * max(_SLOWEST, min(1.0, self.factor or 1.0))
-            before = now
-            if left_s < 0.0:
+            if self.graph_ns != graph_ns:
+                # It begins anew with a supervisor that restarts.
+                passed_ns += max(0, self.graph_ns - graph_ns) if graph_ns else 0
+                graph_ns, moved_s = self.graph_ns, now
+            if min(now - begun_s, passed_ns * 1e-9) > patience_s or now - moved_s > patience_s:
                 return False
             self.serve(POLL_S)
 
@@ -197,7 +208,7 @@ class GraphListener(ClosedOnExit):
     ) -> None:
         """Listen until something has come true; GraphError if it has not within so long."""
         if not self.wait_until(condition, patience_s):
-            raise GraphError(f'timed out after {patience_s:g} s waiting for {what}')
+            raise GraphError(f'timed out after {patience_s:g} s{self.pace} waiting for {what}')
 
     def close(self) -> None:
         """Listen no more; the node remains."""

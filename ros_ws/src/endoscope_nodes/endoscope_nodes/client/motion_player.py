@@ -9,7 +9,6 @@ from typing import Any, Protocol
 from sensor_msgs.msg import Joy
 from std_srvs.srv import Trigger
 
-from endoscope_core.choices import BY_ADOPTED
 from endoscope_core.errors import NotPlayedError, OutputError, RigStoppedError
 from endoscope_core.investigation_folder import is_left_behind
 from endoscope_nodes import names
@@ -22,19 +21,19 @@ from endoscope_nodes.client.plant_adoption import (
     RefusedAdoptionError,
     plant_text,
 )
+from endoscope_nodes.runtime.node_parameters import FOR_SESSION
 from endoscope_nodes.runtime.qos import EVENT
 
 RECORDER_NODE = 'recorder'
 PATIENCE_S = 20.0
 NEXT_WORD_S = 1.5
-"""The console says once a second how far it is; a word from before means nothing."""
+"""The master says once a second how far it is; a word from before means nothing."""
 LET_GO_S = 0.2
 """Before the clutch is held, in several words, so that each node has heard one."""
 REST_S = 0.5
 """After a motion, so that what it leaves behind is recorded."""
-COMPENSATOR = 'compensator'
-AS_COMMANDED = (
-    (COMPENSATOR, {'mode': 'none', 'selected_by': ''}),
+AS_COMMANDED: tuple[tuple[str, dict[str, Any]], ...] = (
+    ('compensator', {'mode': 'none'}),
     ('controller', {'active': False}),
 )
 """The motors do what the motion asks: the plant's answer to that was found to be safe."""
@@ -63,10 +62,10 @@ class MotionPlayer:
     A session is opened for a motion that somebody consents to, and ends with it. Whatever ends a
     motion before its end pauses the graph. The motion goes on only while the clutch is held: by the
     player, so that nothing moves on once its program is gone, or with `hold_to_play` by a person,
-    who enables the slave, too. What is `withdrawn` after consent is not played. A recording that an
-    investigation has left behind whose program is gone, or that nobody asked for, makes room for
-    its own; any other goes on. `plants` are those of whoever asks for plants by this client
-    already.
+    who enables the slave, too. What is `withdrawn` after consent, for a reason in words, is not
+    played. A recording that an investigation has left behind whose program is gone, or that nobody
+    asked for, makes room for its own; any other goes on. `plants` are those of whoever asks for
+    plants by this client already.
     """
 
     def __init__(
@@ -75,7 +74,7 @@ class MotionPlayer:
         consent: Consent,
         *,
         hold_to_play: bool = False,
-        withdrawn: Callable[[], bool] = lambda: False,
+        withdrawn: Callable[[], str] = lambda: '',
         plants: AdoptedPlants | None = None,
     ) -> None:
         self._client = client
@@ -84,7 +83,6 @@ class MotionPlayer:
         self._withdrawn = withdrawn
         self._plants = plants or AdoptedPlants(client)
         self.prepares = False  # once consented to, whether it may not be enabled yet
-        self._tries = False  # whether a plant is in force that was given for one motion
 
     def play(self, motion: PlayedMotion, file: Path, bag: Path, plant: Path | None = None) -> None:
         """Play a motion, which a file holds, and record it to a bag that does not exist.
@@ -103,10 +101,10 @@ class MotionPlayer:
             raise NotPlayedError('the motion was not wanted')
         self._look()
         with ExitStack() as after:
-            if client.state == 'ENABLED':
+            if client.state != 'DISABLED':
                 # In a session that goes on, the master would come as a second sender.
                 client.ask('disable', PATIENCE_S)
-            self._as_commanded(after)
+            self._silence_master(after)
             self.prepares = False
             try:
                 if self._hold_to_play:
@@ -116,6 +114,8 @@ class MotionPlayer:
                 if not self._hold_to_play:
                     client.ask_and_see('enable', PATIENCE_S)
                 self._require_enabled()
+                for node, values in AS_COMMANDED:
+                    self._set_for_session(node, values, after)
                 if plant is not None:
                     self._through(plant_text(plant), lambda: self._played(motion, file))
                 else:
@@ -139,25 +139,18 @@ class MotionPlayer:
         if client.state == 'FAULT':
             raise RigStoppedError(f'FAULT: {client.why or "its cause is not known"}')
 
-    def _as_commanded(self, after: ExitStack) -> None:
-        """Let nothing add to the motion, until `after`."""
-        silent = {'source': 'none', 'hold_to_play': True, 'command_file': ''}
-        for node, values in (*AS_COMMANDED, (names.MASTER_NODE, silent)):
-            before = {
-                name: read_parameter(self._client, f'{node}.{name}', PATIENCE_S).value
-                for name in values
-            }
+    def _silence_master(self, after: ExitStack) -> None:
+        """Let nobody else move the slave in the session that is going to be opened."""
+        source = f'{names.MASTER_NODE}.source'
+        if read_parameter(self._client, source, PATIENCE_S).value in ('motion', 'file'):
             # Nothing begins to move by itself once the session is over.
-            if node == names.MASTER_NODE and before['source'] in ('motion', 'file'):
-                before['source'] = 'none'
-            after.callback(self._as_before, node, before)
-            given: dict[str, Any] = {k: v for k, v in values.items() if v != ''}
-            set_parameters(self._client, node, given)
+            set_parameters(self._client, names.MASTER_NODE, {'source': 'none'})
+        self._set_for_session(names.MASTER_NODE, {'source': 'none', 'hold_to_play': True}, after)
 
-    def _as_before(self, node: str, before: dict[str, Any]) -> None:
-        # The plant of before cannot be put into force again where no session is open any more.
-        lost = node == COMPENSATOR and self._tries and before['selected_by'] == BY_ADOPTED
-        set_parameters(self._client, node, {**before, 'mode': 'none'} if lost else before)
+    def _set_for_session(self, node: str, values: dict[str, Any], after: ExitStack) -> None:
+        """Set parameters until the motion session ends, `after` at the latest."""
+        after.callback(set_parameters, self._client, node, {FOR_SESSION: False})
+        set_parameters(self._client, node, values | {FOR_SESSION: True})
 
     def _through(self, plant: str, played: Callable[[], None]) -> None:
         """Do something while the compensator inverts a plant."""
@@ -165,10 +158,7 @@ class MotionPlayer:
         try:
             self._session()
             plants.adopt(plant, PATIENCE_S)
-            self._tries = True
             played()
-            plants.adopt('', PATIENCE_S)
-            self._tries = False
         except RefusedAdoptionError as error:
             raise NotPlayedError(f'the compensator does not take the plant: {error}') from error
         finally:
@@ -177,7 +167,7 @@ class MotionPlayer:
     def _until_enabled(self) -> None:
         client = self._client
         client.wait_until(
-            lambda: client.state in ('ENABLED', 'FAULT') or self._withdrawn(), math.inf
+            lambda: client.state in ('ENABLED', 'FAULT') or bool(self._withdrawn()), math.inf
         )
         self._require_enabled()
 
@@ -226,7 +216,8 @@ class MotionPlayer:
         client = self._client
         session = self._session()
         path = str(file.absolute())
-        set_parameters(client, names.MASTER_NODE, {'command_file': path, 'source': 'file'})
+        playing = {'command_file': path, 'source': 'file', FOR_SESSION: True}
+        set_parameters(client, names.MASTER_NODE, playing)
         asked_ns = client.graph_ns
 
         def is_at_its_end() -> bool:
@@ -245,11 +236,10 @@ class MotionPlayer:
             self._require_enabled(session)
             if not is_at_its_end():
                 raise GraphError(
-                    f'the console did not play {file} to its end in {patience_s:.0f} s'
+                    f'the master did not play {file} to its end in {patience_s:.0f} s{client.pace}'
                 )
         client.wait_until(lambda: not self._goes_on(session), REST_S)
         self._require_enabled(session)
-        set_parameters(client, names.MASTER_NODE, {'source': 'none'})
 
     def _session(self) -> str:
         """The motion session that has been opened, which is told a beat after the state."""
@@ -266,8 +256,9 @@ class MotionPlayer:
         if client.state == 'FAULT':
             client.wait_until(lambda: bool(client.why), NEXT_WORD_S)
             raise RigStoppedError(f'FAULT: {client.why or "its cause is not known"}')
-        if self._withdrawn():
-            raise NotPlayedError('a person ended it')
+        withdrawn = self._withdrawn()
+        if withdrawn:
+            raise NotPlayedError(withdrawn)
         if client.state != 'ENABLED':
             raise NotPlayedError(f'the slave is {client.state}: {client.why or "asked for"}')
         if session is not None and client.session != session:

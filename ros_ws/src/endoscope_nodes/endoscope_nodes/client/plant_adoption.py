@@ -3,7 +3,7 @@
 import json
 import threading
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -22,6 +22,7 @@ from endoscope_nodes.runtime.qos import EVENT
 REQUEST = 'adopt'
 IN_FORCE, ADOPTION = 'compensator: adopted plant', 'compensator: adoption'
 _REACH = 'reach.'
+_WITHDRAWN_S = 1.0
 
 
 class RefusedAdoptionError(GraphError):
@@ -37,7 +38,8 @@ class AdoptionRequest:
     """What a compensator is asked to put into force."""
 
     id: str  # which no other request has
-    plant: str  # text of the plant file; empty for the plant before
+    # Text of the plant file; empty for the plant before. The id again, without one, withdraws it.
+    plant: str
     session: str  # motion session in which it is asked for
 
     def message(self, stamp_ns: int) -> DiagnosticArray:
@@ -173,7 +175,7 @@ class AdoptedPlants:
         Raises
         ------
         RefusedAdoptionError
-            If it is refused: why, with a code.
+            If it is refused, or withdrawn because it took too long: why, with a code.
         GraphError
             If nobody answers in time.
         """
@@ -205,9 +207,17 @@ class AdoptedPlants:
         request = AdoptionRequest(f'{time.time_ns()}', plant, client.session)
         self._answer, self._asked = None, request.id
         publisher.publish(request.message(client.graph_ns))
-        client.wait_for(lambda: self._final is not None, 'the compensator', patience_s)
+        if not client.wait_until(lambda: self._final is not None, patience_s):
+            publisher.publish(replace(request, plant='').message(client.graph_ns))
+            # It may be in force just now.
+            client.wait_until(lambda: self._final is not None, _WITHDRAWN_S)
         answer = self._final
-        assert answer is not None
+        if answer is None:
+            raise GraphError(
+                f'the compensator has not answered for {patience_s:g} s{client.pace}, nor to that '
+                'it is asked no more: the plant may still come into force; see compensator in '
+                '`endoscope operate status`'
+            )
         return answer
 
     def leave(self) -> None:

@@ -36,7 +36,7 @@ from endoscope_nodes.nodes.plant_adoption import PlantAdoption, Selection
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report, diagnostic_array, status
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
-from endoscope_nodes.runtime.node_parameters import CompensatorParameters
+from endoscope_nodes.runtime.node_parameters import FOR_SESSION, CompensatorParameters
 from endoscope_nodes.runtime.qos import COMMAND, RESULT
 from endoscope_nodes.runtime.streams import JointPublisher, JointSample
 from endoscope_nodes.runtime.ticker import TICK_S
@@ -147,6 +147,8 @@ class CompensatorNode(EndoscopeNode):
         self.ticker.every(0.1, self._publish_state)
 
     def _on_parameters(self, parameters: CompensatorParameters) -> None:
+        if self._settings.for_session and not parameters.for_session:
+            self._adoption.end_session()
         self._settings = parameters
         self._select_law()
         self._adoption.tell()
@@ -156,8 +158,10 @@ class CompensatorNode(EndoscopeNode):
 
     def _reselect(self, selection: Selection) -> None:
         mode, selected_by = selection
-        wanted = [Parameter('mode', value=mode), Parameter('selected_by', value=selected_by)]
-        self.set_parameters_atomically(wanted)
+        wanted: dict[str, str | bool] = {'mode': mode, 'selected_by': selected_by}
+        if self._settings.for_session:
+            wanted |= {FOR_SESSION: True}
+        self.set_parameters_atomically([Parameter(k, value=v) for k, v in wanted.items()])
         # Another plant may be in force under the same selection.
         self._select_law()
 

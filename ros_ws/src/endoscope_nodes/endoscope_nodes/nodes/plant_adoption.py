@@ -13,6 +13,7 @@ from endoscope_nodes import names
 from endoscope_nodes.client.order_feedback import OrderState
 from endoscope_nodes.client.plant_adoption import AdoptionRequest, PlantInForce
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.node_parameters import FOR_SESSION
 from endoscope_nodes.runtime.qos import EVENT, RESULT
 from endoscope_nodes.safety.sessions import SessionWatch
 
@@ -29,6 +30,7 @@ class _Before:
 
     plant: AdoptedPlant | None  # None where it was no adopted one
     selection: Selection
+    for_session: bool  # whether that is so again when the session ends
 
 
 class PlantAdoption:
@@ -71,6 +73,11 @@ class PlantAdoption:
         """Say anew what is in force."""
         self._news = True
 
+    def end_session(self) -> None:
+        """Go back to the plant from before what was set for the session that has ended."""
+        while self._before and self._before[-1].for_session:
+            self.plant = self._before.pop().plant
+
     def close(self) -> None:
         """Let the thread end in which plants are tried."""
         self._thread.shutdown()
@@ -84,6 +91,11 @@ class PlantAdoption:
         request = AdoptionRequest.of_message(message)
         if request is None:
             self._node.get_logger().warning(f'{names.COMPENSATOR_ADOPT} is no request: ignored')
+            return
+        if request.id == self._told.id:
+            if self._request is not None:
+                withdrawn = AdoptionError(AdoptionCode.WITHDRAWN, 'withdrawn: it took too long')
+                self._reject(self._request, withdrawn)
             return
         try:
             self._check(request)
@@ -156,7 +168,8 @@ class PlantAdoption:
             except AdoptionError as error:
                 self._reject(request, error)
             else:
-                self._before.append(_Before(self.plant, self._selected()))
+                for_session = self._node.get_parameter(FOR_SESSION).value
+                self._before.append(_Before(self.plant, self._selected(), for_session))
                 self.plant = plant
                 self._select((PHYSICAL, BY_ADOPTED))
                 self._say(request, OrderState.SUCCEEDED, self._in_words())

@@ -19,7 +19,7 @@ from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from endoscope_nodes.runtime.node_parameters import OF_NODE
+from endoscope_nodes.runtime.node_parameters import FOR_SESSION, OF_NODE
 from endoscope_nodes.runtime.parameters import ParameterError, checked, constraints
 
 _PARAMETERS = 'ros__parameters'
@@ -64,6 +64,14 @@ def _watch(
     check_all: Callable[[Any], object] | None,
 ) -> None:
     state = [current]
+    before: dict[str, Any] = {}  # what falls back when the motion session ends
+
+    def with_what_falls_back(parameters: list[Parameter]) -> list[Parameter]:
+        asked = {p.name: p.value for p in parameters}
+        if asked.get(FOR_SESSION, True):
+            return parameters
+        back = [Parameter(name, value=value) for name, value in before.items()]
+        return [*parameters, *(p for p in back if p.name not in asked)]
 
     def changed(parameters: list[Parameter]) -> dict[str, Any]:
         return {
@@ -83,11 +91,22 @@ def _watch(
 
     def apply(parameters: list[Parameter]) -> None:
         new = changed(parameters)
+        if new.get(FOR_SESSION):
+            for name in new:
+                before.setdefault(name, getattr(state[0], name))
+        elif FOR_SESSION in new:
+            before.clear()
+        else:
+            # What somebody sets meanwhile stays.
+            for name in new:
+                before.pop(name, None)
         if new:
             state[0] = dataclasses.replace(state[0], **new)
             if on_change is not None:
                 on_change(state[0])
 
+    if FOR_SESSION in fields:
+        node.add_pre_set_parameters_callback(with_what_falls_back)
     node.add_on_set_parameters_callback(check)
     node.add_post_set_parameters_callback(apply)
 
@@ -116,23 +135,35 @@ def check_overrides(nodes: list[Node]) -> None:
 
 def check_sections(args: Sequence[str], namespace: str) -> list[str]:
     """Refuse parameters for nodes that there cannot be; a line for each section of another rig."""
-    # What rcl understands: `-p NODE:NAME:=VALUE` with a node in no namespace, and in files
-    # `/NAMESPACE/NODE`, nested or not, where `*` stands for one name and `**` for any number of
-    # them (rcl_yaml_param_parser, and the matching of rclcpp and rclpy).
+    # What rcl understands in files: `/NAMESPACE/NODE`, nested or not, where `*` stands for one name
+    # and `**` for any number of them (rcl_yaml_param_parser, and the matching of rclcpp and rclpy).
     # A file may serve several processes and rigs, so that a section need not be for a node of this
     # process, but for one of this project.
     renamed = [rule.partition('__node:=')[2] for rule in _values_of(args, ('-r', '--remap'))]
     known = sorted({*OF_NODE, *renamed} - {''})
-    for rule in _values_of(args, ('-p', '--param')):
-        node, colon, _ = rule.partition(':=')[0].partition(':')
-        if colon:
-            _check(f"'-p {rule}'", f'/{node}', known, namespace)
+    for node in given_to_nodes(args):
+        # One that is renamed keeps the name of its program here.
+        _check(f"'-p {node}:'", f'/**/{node}', sorted(OF_NODE), namespace)
     told = []
     for file in _values_of(args, ('--params-file',)):
         for section in _sections(file):
             if not _check(f"{file}: section '{section}'", section, known, namespace):
                 told.append(f"{file}: section '{section}' is for no node in {namespace}")
     return told
+
+
+def given_to_nodes(args: Sequence[str]) -> dict[str, dict[str, object]]:
+    """Values of `-p NODE:NAME:=VALUE` by node, in whatever namespace that is.
+
+    rcl would give them to a node without a namespace alone, and knows no rule for any other.
+    """
+    found: dict[str, dict[str, object]] = {}
+    for rule in _values_of(args, ('-p', '--param')):
+        name, _, value = rule.partition(':=')
+        node, colon, parameter = name.partition(':')
+        if colon:
+            found.setdefault(node.strip('/'), {})[parameter] = yaml.safe_load(value)
+    return found
 
 
 def _values_of(args: Sequence[str], options: Sequence[str]) -> list[str]:

@@ -6,6 +6,7 @@ from typing import Any
 from rclpy.clock import Clock, ClockType, ROSClock
 from rclpy.event_handler import QoSSubscriptionEventType
 from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 from rclpy.time import Time
@@ -16,6 +17,7 @@ from endoscope_nodes.runtime.declared_parameters import declare_parameters
 from endoscope_nodes.runtime.diagnostics import Diagnostics
 from endoscope_nodes.runtime.eventless_node import EventlessNode
 from endoscope_nodes.runtime.node_context import NAMESPACE, NodeContext
+from endoscope_nodes.runtime.node_parameters import FOR_SESSION
 from endoscope_nodes.runtime.parameters import ParameterError, changed
 
 
@@ -49,6 +51,13 @@ class EndoscopeNode(EventlessNode):
             name: value for name, value in changed(values).items() if name not in self._by_default
         }
         return values
+
+    def end_session(self) -> None:
+        """Let the parameters fall back that were set for the motion session which has ended."""
+        if self.has_parameter(FOR_SESSION) and self.get_parameter(FOR_SESSION).value:
+            done = self.set_parameters_atomically([Parameter(FOR_SESSION, value=False)])
+            if not done.successful:
+                self.get_logger().error(f'parameters of a session stay: {done.reason}')
 
     def create_subscription(
         self, msg_type: type, topic: str, callback: Any, qos_profile: Any, **how: Any

@@ -5,6 +5,7 @@ Nodes declare them, ``--help`` and the reference list them; nothing here needs R
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from endoscope_core import choices
 from endoscope_nodes import names
@@ -21,6 +22,18 @@ FOLLOWED = (
     names.WIRES_MEASURED,
 )
 """Streams that the simulation clock can wait for."""
+
+
+FOR_SESSION = 'for_session'
+
+
+def _for_session() -> Any:
+    return parameter(
+        False,
+        'true: the parameters that are set with it fall back when the motion session ends, or the '
+        'next one where none is open; false: they fall back now',
+        dynamic=True,
+    )
 
 
 @dataclass(frozen=True)
@@ -229,6 +242,7 @@ class CompensatorParameters:
         low=0.0,
         high=0.5,
     )
+    for_session: bool = _for_session()
 
 
 @dataclass(frozen=True)
@@ -248,6 +262,7 @@ class ControllerParameters:
     fade_time: float = parameter(
         1.0, 'time from no correction to the whole and back', unit='s', low=0.05, high=30.0
     )
+    for_session: bool = _for_session()
 
 
 @dataclass(frozen=True)
@@ -285,6 +300,7 @@ class MasterParameters:
         low=0.01,
         high=10.0,
     )
+    for_session: bool = _for_session()
 
 
 @dataclass(frozen=True)

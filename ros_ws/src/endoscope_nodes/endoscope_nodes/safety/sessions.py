@@ -126,6 +126,8 @@ class SessionWatch:
         doubt = self._supervisors.rivals()
         now = self._node.ticker.monotonic_ns()
         if self._session.hear(message.frame_id, now, doubt):
+            if self._told[0]:
+                self._node.end_session()
             self._told = (self._session.name, '')
             if self._on_enter is not None:
                 self._on_enter()
@@ -138,8 +140,10 @@ class SessionWatch:
         if told == self._told:
             return
         before, self._told = self._told, told
-        if before[0] and not told[0] and self._on_leave is not None:
-            self._on_leave()
+        if before[0] and not told[0]:
+            if self._on_leave is not None:
+                self._on_leave()
+            self._node.end_session()
         if told[1]:
             self._node.get_logger().error(told[1])
         self._node.diagnostics.publish()
