@@ -182,6 +182,17 @@ def test_a_bag_without_commands_is_refused_and_leaves_nothing(plant_file, tmp_pa
     assert sorted(p.name for p in tmp_path.iterdir()) == ['mute', 'plant.yaml']
 
 
+def test_commands_in_degrees_are_known_by_the_reach_of_the_rig(plant_file, tmp_path, capsys):
+    with BagWriter(tmp_path / 'degrees') as writer:
+        named = ['motor_x', 'motor_y']
+        writer.write_streams([stream('/motor/servo_jp', named, STAMPS, position=np.degrees(SHAFT))])
+    assert run(plant_file, tmp_path / 'degrees', tmp_path / 'out') == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert 'the shaft of bend_x to 17.19 rad, beyond the 1.6 rad of the rig' in line
+    assert 'not in degrees' in line
+    assert not (tmp_path / 'out').exists()
+
+
 def test_a_command_that_is_not_a_number_is_refused(plant_file, tmp_path, capsys):
     shaft = SHAFT.copy()
     shaft[700, 0] = np.nan

@@ -39,7 +39,9 @@ def test_a_plant_with_every_effect_survives_the_round_trip(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ['plant.yaml']
 
 
-@pytest.mark.parametrize('text', ['', 'joints: {bend_x: {}, bend_y: {}}\neffects: []\n', 'joints:'])
+@pytest.mark.parametrize(
+    'text', ['{}', 'joints: {bend_x: {}, bend_y: {}}\neffects: []\n', 'joints:']
+)
 def test_what_is_missing_is_nominal(tmp_path, text):
     plant = load_plant(written(tmp_path, text))
     assert plant.sensors == SensorParameters()
@@ -64,6 +66,7 @@ def test_a_number_without_a_dot_before_its_exponent_is_a_number(tmp_path):
     [
         ('joins: {}', 'unknown key joins: did you mean joints'),
         ('joints: {bend_z: {}}', 'joints: unknown key bend_z: did you mean bend_'),
+        ('', 'is empty: name its joints at least, such as'),
         ('joints: {}', 'joints is empty'),
         ('joints: {bend_x: {capstan_exponant: 1}}', 'did you mean capstan_exponent'),
         ('joints: {bend_x: {xyz: 1}}', 'joints.bend_x: unknown key xyz: valid are pretension'),

@@ -47,6 +47,8 @@ from endoscope_explain.recording import (
 
 POSE_TOPIC = 'tracker/measured_cp'
 
+ROUNDING = 1.0 + 1e-9
+
 READ_DELAYS = (0.0, TICK)
 """Seconds from a stamp to its reading that a rig at 1 kHz may have."""
 
@@ -115,7 +117,10 @@ class BagCommands:
 
 
 def commands_of_bag(recording: Recording, plant: PlantDescription, rig: Rig) -> BagCommands:
-    """Shaft commands of a bag, or desired angles times the gear; InputError without either."""
+    """Shaft commands of a bag, or desired angles times the gear.
+
+    InputError without either, and where one turns a shaft further than the rig lets it.
+    """
     topic = input_topic(recording)
     if not topic:
         raise InputError(recording.lacking(COMMAND, DESIRED))
@@ -131,7 +136,16 @@ def commands_of_bag(recording: Recording, plant: PlantDescription, rig: Rig) -> 
         )
     chosen = series.select([names[joint] for joint in joints])
     scale = rig.joints.gear if desired else 1.0
-    return BagCommands(series.topic, joints, chosen.stamp_ns, scale * chosen.require('position'))
+    shaft = scale * chosen.require('position')
+    furthest = np.abs(shaft).max(axis=0)
+    if furthest.max() > rig.motors.reach * ROUNDING:
+        worst = joints[int(np.argmax(furthest))]
+        raise InputError(
+            f'{recording.path}: {series.topic} turns the shaft of {worst} to {furthest.max():.4g} '
+            f'rad, beyond the {rig.motors.reach:g} rad of the rig (motors.reach): give angles in '
+            'rad, not in degrees, or the rig that has this reach'
+        )
+    return BagCommands(series.topic, joints, chosen.stamp_ns, shaft)
 
 
 @dataclass(frozen=True)

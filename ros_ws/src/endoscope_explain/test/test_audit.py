@@ -140,6 +140,16 @@ def test_swapped_neighbours_are_put_in_order(sound):
     assert np.array_equal(report.recording.tension.values, sound.tension.values)
 
 
+@pytest.mark.parametrize(('quantity', 'jitter'), [('bending', 0.02), ('tension', 0.005)])
+def test_stamps_that_jitter_are_noted_with_how_much(sound, quantity, jitter):
+    series = sound.measured()[quantity]
+    off = np.random.default_rng(1).normal(0.0, jitter, len(series.time))
+    finding = named(sound.with_series({quantity: changed(series, time=series.time + off)}))
+    noted = finding['jittering_stamps']
+    assert (noted.signals, noted.severity) == ((series.topic,), Severity.NOTE)
+    assert noted.evidence['jitter_s'] == pytest.approx(jitter, rel=0.1)
+
+
 def test_a_clock_that_is_set_back_is_a_fault(sound):
     time = sound.bending.time.copy()
     time[300:] -= 1.0

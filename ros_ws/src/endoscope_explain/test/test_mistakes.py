@@ -37,6 +37,19 @@ def in_degrees(recording):
     return recording.with_series({'bending': replace(bending, values=np.degrees(bending.values))})
 
 
+def test_a_command_in_degrees_is_known_by_the_reach_of_the_rig_where_only_the_tip_was_measured(
+    record,
+):
+    sound = replace(record(duration=6.0), tension=None, shaft_position=None, shaft_velocity=None)
+    sound = replace(sound, shaft_effort=None)
+    assert audit_recording(sound, PlantDescription()).mistakes() == ()
+    command = replace(sound.command, values=np.degrees(sound.command.values))
+    audit = audit_recording(sound.with_series({'command': command}), PlantDescription())
+    (mistake,) = audit.mistakes()
+    assert mistake.text.startswith('motor/servo_jp:motor_x and motor/servo_jp:motor_y are 57.3 ')
+    np.testing.assert_allclose(audit.recording.command.values, sound.command.values)
+
+
 @pytest.mark.parametrize(
     ('change', 'sentence', 'lost'),
     [

@@ -111,7 +111,11 @@ def load_plant(path: str | Path) -> PlantDescription:
         content = load_yaml(path)
     except FileError as error:
         raise FileError(f'plant file: {error}') from error
-    return plant_from_mapping({} if content is None else content, f'plant file {path}')
+    if content is None:
+        raise FileError(
+            f'plant file {path} is empty: name its joints at least, such as joints: {{bend_x: {{}}}}'
+        )
+    return plant_from_mapping(content, f'plant file {path}')
 
 
 def plant_from_mapping(content: Any, where: str = 'the plant') -> PlantDescription:

@@ -33,8 +33,10 @@ SETTLING_S = 0.5
 def audit_recording(recording: Recording, plant: PlantDescription) -> AuditReport:
     """Find what is wrong with a recording, and correct it to what it must mean where it can be."""
     findings: list[Finding] = []
-    recording = _on_ordered_stamps(recording, findings)
+    recorded, recording = recording, _on_ordered_stamps(recording, findings)
     in_other_units = stamps.stamp_unit_findings(recording, plant.sensors)
+    if not in_other_units:
+        findings += stamps.jitter_findings(recorded, plant.sensors)
     recording = _on_one_clock(stamps.in_seconds(recording, in_other_units), findings)
     over_all = ((0.0, recording.duration),)
     findings += [replace(f, intervals=over_all) for f in in_other_units]

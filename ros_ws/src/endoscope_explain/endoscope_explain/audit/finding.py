@@ -23,7 +23,8 @@ class Finding:
 
     # Catalogue id (`recording_gap`, `clock_skew`, `tracker_outliers`, `load_cell_saturation`), or
     # what was found: `wrong_unit`, `wrong_sign`, `exchanged`, `wrong_gear`, `frozen`,
-    # `repeated_stamps`, `unordered_stamps`, `held_samples`, `held_pose`.
+    # `repeated_stamps`, `unordered_stamps`, `jittering_stamps`, `held_samples`,
+    # `held_pose`.
     id: str
     severity: Severity
     joint: str  # joint it concerns; the first one if it concerns all

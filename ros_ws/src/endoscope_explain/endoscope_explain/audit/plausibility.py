@@ -96,7 +96,8 @@ class Comparison:
         """Find the mistakes that make the recording more likely than their price, if any."""
         worth = self._criteria.worth if worth is None else worth
         right, usual = self._right(), self._criteria.usual
-        as_read = sum(self._ways(right, q)[0].against(worth) for q in self.measured)
+        as_read = self._beyond_reach(right, worth)
+        as_read += sum(self._ways(right, q)[0].against(worth) for q in self.measured)
         at_best = sum(self.measured[q].shape[1] * log(usual[q]) for q in self.measured)
         if as_read - worth * at_best < log(KINDS):
             return ()
@@ -105,7 +106,7 @@ class Comparison:
         for drive in self._misreadings('command', self._held.shape[1]):
             if drive.price and not self._may_be_meant(drive):
                 continue
-            against, said = 0.0, [drive] if drive.price else []
+            against, said = self._beyond_reach(drive, worth), [drive] if drive.price else []
             for quantity in self.measured:
                 of_gear = drive.of_gear and quantity == 'shaft_position'
                 way = min(
@@ -166,6 +167,15 @@ class Comparison:
         followed = self._ways(drive, 'shaft_position')
         allowed = log(self._criteria.follows) * self._held.shape[1]
         return any(w.misfit <= allowed for w in followed if w.reading.kind in ('right', 'sign'))
+
+    def _beyond_reach(self, drive: Misreading, worth: float) -> float:
+        """What speaks against a command that turns shafts further than the rig lets them.
+
+        Of bending nothing is learnt: it follows any command at some scale.
+        """
+        turned = np.abs(self._held[:, list(drive.source)] / np.asarray(drive.factor)).max(axis=0)
+        columns = int((turned > self._rig.motors.reach).sum())
+        return columns * worth * log(MOST / self._criteria.usual['shaft_position'])
 
     def simulated(self, command: Misreading) -> dict[str, Array]:
         """Simulate the plant on the command as it is meant."""

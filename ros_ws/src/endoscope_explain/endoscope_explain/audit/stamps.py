@@ -1,4 +1,4 @@
-"""Stamps: out of order, repeated, missing, of clocks that run apart, or in another unit."""
+"""Stamps: out of order, repeated, jittering, missing, of other clocks, or in another unit."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -15,6 +15,10 @@ from endoscope_explain.recording import BENDING, MOTOR, WIRES, Array, Recording,
 
 GAP_FACTOR = 2.5
 """A gap is at least this many usual sample intervals: one lost sample is not one."""
+LEAST_STAMPS = 20
+NORMAL_MEDIAN = 0.6745
+"""Median of the size of normal noise, in its rms."""
+SPEED_WINDOW_S = 0.2
 
 
 def order_stamps(series: Series, joint: str) -> tuple[Series, list[Finding]]:
@@ -61,6 +65,50 @@ def order_stamps(series: Series, joint: str) -> tuple[Series, list[Finding]]:
             )
         )
     return series.taken(order[fresh]), findings
+
+
+def jitter_findings(recording: Recording, sensors: SensorParameters) -> list[Finding]:
+    """Note topics, as recorded, whose stamps jitter so that readings in motion err beyond noise."""
+    noise = {
+        'shaft_position': 2.0 * np.pi / sensors.encoder_counts,
+        'tension': max(sensors.load_cell_noise, sensors.load_cell_resolution),
+        'bending': sensors.tracker_noise,
+    }
+    findings = []
+    for quantity, series in recording.measured().items():
+        if not noise.get(quantity) or len(series.time) < LEAST_STAMPS:
+            continue
+        step = np.diff(series.time)
+        # A stamp with white jitter is off the middle of its neighbours by the root of 1.5 times as
+        # much; the median ignores pauses.
+        off_middle = 0.5 * np.abs(np.diff(step))
+        jitter = float(np.median(off_middle)) / NORMAL_MEDIAN / np.sqrt(1.5)
+        error = jitter * _speed(series)
+        if error > noise[quantity]:
+            findings.append(
+                Finding(
+                    'jittering_stamps',
+                    Severity.NOTE,
+                    recording.joints[0],
+                    'recording',
+                    (series.topic,),
+                    ((0.0, recording.duration),),
+                    f'the stamps of {series.topic} jitter by {1e3 * jitter:.3g} ms (rms): in motion '
+                    f'readings err by {error / noise[quantity]:.2g} times their noise',
+                    'nothing was put right: stamp readings when they are taken, not received',
+                    evidence={'jitter_s': jitter},
+                )
+            )
+    return findings
+
+
+def _speed(series: Series) -> float:
+    """How fast the quickest column of a series changes (rms), per s."""
+    order = np.argsort(series.time, kind='stable')
+    grid = np.arange(series.time.min(), series.time.max(), SPEED_WINDOW_S)
+    columns = series.values.reshape(len(series.time), -1)[order].T
+    moved = np.array([np.diff(np.interp(grid, series.time[order], c)) for c in columns])
+    return float(np.sqrt(np.mean(moved**2, axis=1).max())) / SPEED_WINDOW_S if moved.size else 0.0
 
 
 def usual_interval(time: Array) -> float:
