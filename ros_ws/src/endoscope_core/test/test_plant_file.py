@@ -66,7 +66,7 @@ def test_a_number_without_a_dot_before_its_exponent_is_a_number(tmp_path):
     [
         ('joins: {}', 'unknown key joins: did you mean joints'),
         ('joints: {bend_z: {}}', 'joints: unknown key bend_z: did you mean bend_'),
-        ('', 'is empty: name its joints at least, such as'),
+        ('', 'is empty: name joints at least, such as'),
         ('joints: {}', 'joints is empty'),
         ('joints: {bend_x: {capstan_exponant: 1}}', 'did you mean capstan_exponent'),
         ('joints: {bend_x: {xyz: 1}}', 'joints.bend_x: unknown key xyz: valid are pretension'),

@@ -113,7 +113,7 @@ def load_plant(path: str | Path) -> PlantDescription:
         raise FileError(f'plant file: {error}') from error
     if content is None:
         raise FileError(
-            f'plant file {path} is empty: name its joints at least, such as joints: {{bend_x: {{}}}}'
+            f'plant file {path} is empty: name joints at least, such as joints: {{bend_x: {{}}}}'
         )
     return plant_from_mapping(content, f'plant file {path}')
 

@@ -93,7 +93,7 @@ def jitter_findings(recording: Recording, sensors: SensorParameters) -> list[Fin
                     'recording',
                     (series.topic,),
                     ((0.0, recording.duration),),
-                    f'the stamps of {series.topic} jitter by {1e3 * jitter:.3g} ms (rms): in motion '
+                    f'stamps of {series.topic} jitter by {1e3 * jitter:.3g} ms (rms): in motion '
                     f'readings err by {error / noise[quantity]:.2g} times their noise',
                     'nothing was put right: stamp readings when they are taken, not received',
                     evidence={'jitter_s': jitter},
