@@ -2,13 +2,15 @@
 
 `durations.json` beside this file says what each test file may cost: CPU seconds of its tests and of
 the programs that they start, over those of 10^7 additions in a Python loop in the same run, so that
-a slow machine is no reason. Files that cost most begin first. A file that takes half more than its
-budget fails the run; `make -C ros_ws durations` writes the budgets anew.
+a slow machine is no reason, nor is physics that has to be compiled anew. Files that cost most begin
+first. A file that takes half more than its budget fails the run; `make -C ros_ws durations` writes
+the budgets anew.
 """
 
 import json
 import os
 import statistics
+import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -33,8 +35,37 @@ _loops: list[float] = []
 
 
 def _cpu_now() -> float:
-    """CPU seconds of this process and of those that it has waited for."""
-    return sum(os.times()[:4])
+    """CPU seconds of this process and of those that it has waited for, but for compiling."""
+    return sum(os.times()[:4]) - _compiling.seconds
+
+
+class _Compiling:
+    """A listener of numba: CPU seconds that it compiles, once it has been imported."""
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+        self._listens = False
+        self._depth = 0
+        self._begun = 0.0
+
+    def listen(self) -> None:
+        if not self._listens and 'numba' in sys.modules:
+            from numba.core import event
+
+            event.Listener.register(_Compiling)
+            event.register('numba:compile', self)
+            self._listens = True
+
+    def notify(self, told: object) -> None:
+        if told.is_start:
+            self._begun = self._begun if self._depth else time.thread_time()
+            self._depth += 1
+        else:
+            self._depth -= 1
+            self.seconds += 0.0 if self._depth else time.thread_time() - self._begun
+
+
+_compiling = _Compiling()
 
 
 def _loop() -> float:
@@ -66,6 +97,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     """Begin to count what a test costs."""
     global _mark
+    _compiling.listen()
     _mark = _cpu_now()
     return (yield)
 

@@ -51,12 +51,9 @@ READING = (
     'console --rig',
 )
 PRINTING = (
-    '--version',
     '--help',
-    'effects',
     'effects --json',
     'completion bash',
-    'bench --help',
 )
 PROGRESS = ('reading the table', 'slave/measured_js')
 """What `convert` says first of what it is at."""
@@ -125,7 +122,11 @@ def test_files_that_cannot_be_used_are_one_line(path, hostile, capsys):
 def test_numbers_that_are_none_are_one_line(path, hostile, capsys):
     parser = COMMANDS[path]
     numeric = [a for a in parser._actions if a.option_strings and is_number(a)]
-    for action, number in itertools.product(numeric, NUMBERS):
+    # Options share their types: each gets a third of the numbers, and each number many options.
+    for k, number in itertools.product(range(len(numeric)), NUMBERS):
+        if (k + NUMBERS.index(number)) % 3:
+            continue
+        action = numeric[k]
         words = [*path, *required(parser, hostile / 'missing', hostile / 'out')]
         ends_in_one_line([*words, f'{action.option_strings[-1]}={number}'], capsys)
 

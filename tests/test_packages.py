@@ -112,24 +112,33 @@ def test_colcon_takes_all_packages_as_ament_python() -> None:
     assert len(PACKAGES) == 10
 
 
+BUILD = """
+import os, runpy, sys
+out, *packages = sys.argv[1:]
+for package in packages:
+    os.chdir(package)
+    to = f'{out}/{os.path.basename(package)}'
+    os.mkdir(to)
+    sys.argv = ['setup.py', '-q', 'egg_info', '--egg-base', to, 'build_py', '--build-lib']
+    sys.argv += [f'{to}/lib', 'install_data', '--install-dir', to]
+    runpy.run_path('setup.py', run_name='__main__')
+"""
+
+
+@pytest.fixture(scope='module')
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp('installed')
+    command = [sys.executable, '-c', BUILD, str(out), *map(str, PACKAGES)]
+    subprocess.run(command, capture_output=True, text=True, check=True)
+    return out
+
+
 @each_package
 def test_everything_in_the_package_and_its_licence_are_installed(
-    package: Path, tmp_path: Path
+    package: Path, installed: Path
 ) -> None:
-    subprocess.run(
-        [sys.executable, 'setup.py', '-q', 'egg_info', '--egg-base', str(tmp_path)]
-        + ['build_py', '--build-lib', str(tmp_path / 'lib')]
-        + ['install_data', '--install-dir', str(tmp_path)],
-        cwd=package,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    built = {
-        path.relative_to(tmp_path / 'lib')
-        for path in (tmp_path / 'lib').rglob('*')
-        if path.is_file()
-    }
+    out = installed / package.name
+    built = {path.relative_to(out / 'lib') for path in (out / 'lib').rglob('*') if path.is_file()}
     sources = {
         path.relative_to(package)
         for path in (package / package.name).rglob('*')
@@ -138,7 +147,7 @@ def test_everything_in_the_package_and_its_licence_are_installed(
     assert built == sources, (
         'a folder without __init__.py, or a suffix that setup.cfg does not ship'
     )
-    licence = tmp_path / 'share' / package.name / 'LICENSE'
+    licence = out / 'share' / package.name / 'LICENSE'
     assert licence.read_text() == (WORKSPACE / 'LICENSE').read_text()
 
 
