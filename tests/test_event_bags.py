@@ -67,8 +67,8 @@ class WatchedSession(RecordedSession):
             self.health.publish(DiagnosticArray(status=[status]))
 
     def kept(self):
-        self.wait(lambda: self.recorder._events.event is not None)
-        self.wait(lambda: self.recorder._events.event is None)
+        self.wait(lambda: self.recorder._events.events)
+        self.wait(lambda: not self.recorder._events.events)
         return event_bags(self.folder)
 
     def said(self):
@@ -115,7 +115,7 @@ def test_a_fault_whose_reason_nobody_tells_is_kept_all_the_same(tmp_path):
 def test_a_mark_while_a_fault_is_written_is_noted_in_the_same_bag(tmp_path):
     with WatchedSession(tmp_path) as session:
         session.fault()
-        session.wait(lambda: session.recorder._events.event.session)
+        session.wait(lambda: session.recorder._events.events[0].session)
         session.serve(1.0)
         session.marks.publish(String(data='  the wire has slipped '))
         [path] = session.kept()
@@ -125,6 +125,29 @@ def test_a_mark_while_a_fault_is_written_is_noted_in_the_same_bag(tmp_path):
         ('mark', 'the wire has slipped'),
     ]
     assert bag.end_ns - events_of(bag.metadata)[1].at_ns >= 1.9e9
+
+
+def test_two_faults_within_two_seconds_have_a_bag_each(tmp_path):
+    second = 'motor_driver: device: overload'
+    with WatchedSession(tmp_path, keep=0.5) as session:
+        session.session.publish(Header(frame_id='session-17'))
+        session.serve(1.0)
+        session.fault()
+        session.wait(lambda: session.recorder._events.events[0].session)
+        session.fault(second)
+        session.wait(lambda: len(session.recorder._events.events) == 2)
+        # A third one is noted beside the second: no more than two are written at a time.
+        session.fault(second)
+        paths = session.kept()
+    bags = [open_bag(path) for path in paths]
+    told = [[e.reason for e in events_of(bag.metadata)] for bag in bags]
+    assert sorted(told) == sorted([[CAUSE], [second, second]])
+    for bag in bags:
+        [*_, last] = events_of(bag.metadata)
+        assert bag.times(f'/endoscope/{MOTION_SESSION}').log_ns[0] == bag.start_ns
+        numbers = bag.joint_state('motor/servo_jp').position[:, 0]
+        assert (np.diff(numbers) == 1).all()
+        assert bag.end_ns - last.at_ns >= 1.9e9
 
 
 def test_a_recording_goes_on_beside_it_and_loses_nothing(tmp_path):
@@ -146,7 +169,7 @@ def test_a_node_that_ends_finishes_what_it_writes(tmp_path):
     with WatchedSession(tmp_path) as session:
         session.serve(0.5)
         session.marks.publish(String())
-        session.wait(lambda: session.recorder._events.event is not None)
+        session.wait(lambda: session.recorder._events.events)
     [path] = event_bags(tmp_path)
     bag = open_bag(path)
     assert [(e.kind, e.reason) for e in events_of(bag.metadata)] == [('mark', 'by the operator')]

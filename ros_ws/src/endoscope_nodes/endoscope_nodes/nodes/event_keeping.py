@@ -1,6 +1,7 @@
 """The recorder's part in keeping events: what led to a fault or an operator's mark, as a bag."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -26,6 +27,17 @@ _REASON_NS = 1_500_000_000
 """How long the reason of a fault is waited for, which the supervisor tells at once and again every
 second."""
 
+_AT_ONCE = 2
+"""Bags that are written at a time, each with the last seconds until it is written; what happens
+beside so many is noted in the last of them."""
+
+
+@dataclass(eq=False)
+class _Writing:
+    event: EventBag
+    begins_ns: int = 0  # at the latest, by the steady clock
+    ends_ns: int = 0
+
 
 class EventKeeping:
     """Keeps the last seconds in memory, for the bag of a fault or of what ``recorder/mark`` says.
@@ -48,9 +60,7 @@ class EventKeeping:
         self.recent = RecentMessages(parameters.keep, parameters.keep_room * _MEGABYTE)
         self.keeps = parameters.keep > 0.0
         self._most = parameters.keep_bags
-        self.event: EventBag | None = None  # whose bag is being written
-        self._ends_ns = 0
-        self._begins_ns = 0
+        self._writing: list[_Writing] = []
         self._trouble = ''
         self._marks = 0
         self._last = ''
@@ -64,9 +74,9 @@ class EventKeeping:
             )
 
     @property
-    def session(self) -> RecordingSession | None:
-        """Into which an event's bag is written."""
-        return self.event.session if self.event else None
+    def events(self) -> list[EventBag]:
+        """Whose bags are being written, oldest first."""
+        return [writing.event for writing in self._writing]
 
     def on_state(self, state: str) -> None:
         """Take the operating state: one that becomes ``FAULT`` is an event."""
@@ -92,31 +102,33 @@ class EventKeeping:
         for status in told.status:
             if status.name == self._supervisor:
                 self._cause = {v.key: v.value for v in status.values}.get('cause', '')
-                if self._cause and self.event is not None and self.event.lacks_reason:
-                    self.event.explain(self._cause)
+                lacking = [event for event in self.events if event.lacks_reason]
+                if self._cause and lacking:
+                    lacking[-1].explain(self._cause)
 
     def _on_event(self, kind: str, reason: str = '') -> None:
-        """Keep what came before in a bag, or note one more event of the bag that is written."""
+        """Keep what came before in a bag; a mark is noted in a bag that is being written."""
         ticker = self._node.ticker
         now_ns, steady_ns = ticker.now_ns(), ticker.monotonic_ns()
         if not now_ns:
             return
-        self._ends_ns = steady_ns + _AFTER_NS
-        self._begins_ns = steady_ns + _REASON_NS
-        if self.event is not None:
-            self.event.add(kind, now_ns, reason)
-            return
-        self._collect(now_ns)
-        self.event = EventBag(self.recent, kind, now_ns, reason)
-        if reason:
-            self._begin(self.event)
+        written = self._writing
+        if written and (kind == MARK or len(written) == _AT_ONCE):
+            written[-1].event.add(kind, now_ns, reason)
+        else:
+            self._collect(now_ns)
+            written.append(_Writing(EventBag(self.recent, kind, now_ns, reason)))
+        written[-1].begins_ns, written[-1].ends_ns = steady_ns + _REASON_NS, steady_ns + _AFTER_NS
+        if reason and written[-1].event.session is None:
+            self._begin(written[-1])
 
-    def _begin(self, event: EventBag) -> None:
+    def _begin(self, writing: _Writing) -> None:
+        event = writing.event
         try:
             path = new_event_bag(self._folder(), event.kind, self._most)
             event.begin(lambda records: self._open_session(path, records))
         except BagError as error:
-            self.event = None
+            self._writing.remove(writing)
             self._say_trouble(f'no bag of the {event.events[0]}: {error}')
             return
         self._trouble, self._last = '', str(path)
@@ -129,35 +141,33 @@ class EventKeeping:
         self._node.diagnostics.publish()
 
     def go_on(self, arrivals: list[Arrival]) -> None:
-        """Write what arrived to the bag of an event, where one is written, and end it in time."""
-        event = self.event
-        if event is None:
+        """Write what arrived to the bags that are being written, and end each in time."""
+        if not self._writing:
             return
         steady_ns = self._node.ticker.monotonic_ns()
-        event.arrive(packed(arrivals), len(arrivals))
-        if event.session is None:
-            if not event.lacks_reason or steady_ns >= self._begins_ns:
-                self._begin(event)
-            return
-        if event.session.full or (steady_ns >= self._ends_ns and event.caught_up):
-            self._end()
+        piece = packed(arrivals)
+        for writing in list(self._writing):
+            event = writing.event
+            event.arrive(piece, len(arrivals))
+            if event.session is None:
+                if not event.lacks_reason or steady_ns >= writing.begins_ns:
+                    self._begin(writing)
+            elif event.session.full or (steady_ns >= writing.ends_ns and event.caught_up):
+                self._end(writing)
 
     def close(self) -> None:
-        """Finish the bag that is being written."""
-        if self.event is not None:
+        """Finish the bags that are being written."""
+        if self._writing:
             self._collect(self._node.ticker.now_ns())
-            self._end()
+        for writing in list(self._writing):
+            if writing.event.session is None:
+                self._begin(writing)
+            if writing in self._writing:
+                self._end(writing)
 
-    def _end(self) -> None:
-        event, self.event = self.event, None
-        if event is None:
-            return
-        if event.session is None:
-            self._begin(event)
-            # It is begun to be ended at once, where the node ends.
-            self.event = None
-        if event.session is None:
-            return
+    def _end(self, writing: _Writing) -> None:
+        self._writing.remove(writing)
+        event = writing.event
         report = event.close()
         if report.full or not report.finished:
             self._say_trouble(f'the bag of the {event.events[0]}: {report}')
@@ -176,4 +186,4 @@ class EventKeeping:
             return ERROR, self._trouble, values
         if not self.keeps:
             return OK, 'keeps nothing for bags of faults and marks', values
-        return OK, 'writing' if self.event else 'keeping the last seconds', values
+        return OK, 'writing' if self._writing else 'keeping the last seconds', values

@@ -284,7 +284,7 @@ class RecorderNode(EndoscopeNode):
         source.offered = offered_profiles(publishers)
         self._sources.append(source)
         self._note_whether_it_holds(source)
-        for session in (self._session, self._events.session):
+        for session in (self._session, *(event.session for event in self._events.events)):
             if session is not None:
                 self._announce(source, session)
 
