@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from endoscope_core.dataset import configuration_of_size, random_instrument
 from endoscope_core.physics import save_plant
+from endoscope_lab.dataset import configuration_of_size, random_instrument
 
 
 def tube_of_size(folder, size_deg, seed):

@@ -38,7 +38,7 @@ WIDTH = 100
 
 CORE = (
     *('physics', 'signals', 'hysteresis', 'control', 'calibration', 'identification'),
-    *('metrics', 'kinematics', 'safety', 'dataset'),
+    *('metrics', 'kinematics', 'safety'),
 )
 DEVICES = ('dynamixel', 'load_cells', 'em_tracker')
 _INDENTED = re.compile(r'^(?: {4}.*\n)+', re.M)

@@ -18,7 +18,10 @@ GROUP = 'endoscope.commands'
 COMES_WITH = {
     'bench': 'endoscope_lab',
     'console': 'endoscope_console',
+    'dataset': 'endoscope_lab',
+    'fit': 'endoscope_lab',
     'prove': 'endoscope_lab',
+    'train': 'endoscope_lab',
 }
 """Packages of this workspace that may be left out, by the command that is missing then."""
 _SECTION = re.compile(rf'^\[{re.escape(GROUP)}\]\n((?:[^\[\n].*\n?|\n)*)', re.MULTILINE)

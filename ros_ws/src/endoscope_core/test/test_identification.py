@@ -3,7 +3,6 @@ import json
 import numpy as np
 import pytest
 
-from endoscope_core.dataset import CLASSES_DEG
 from endoscope_core.errors import FileError, InputError
 from endoscope_core.hysteresis import BoucWenParameters, forward
 from endoscope_core.identification import (
@@ -16,6 +15,7 @@ from endoscope_core.identification import (
 )
 from endoscope_core.signals import calibration_sinusoid
 
+CLASSES_DEG = (40, 50, 60, 70, 80, 90, 100)
 TRUE = BoucWenParameters.from_shape(alpha=0.91, lag=0.55, travel=0.42, rho=0.45, n=2.0)
 TIME = np.arange(0.0, 9.0, 0.02)
 DRIVER = calibration_sinusoid()(TIME)[0]

@@ -18,14 +18,14 @@ from endoscope_core.control import (
     bending_range,
     shipped_limits,
 )
-from endoscope_core.dataset import configuration_of_size, random_instrument
-from endoscope_core.dataset.rig_variation import calibration_command
 from endoscope_core.identification.law_choice import CalibrationFindings, LawChoice
 from endoscope_core.identification.plant_fit import plants_of_calibration
 from endoscope_core.metrics import tracking_rmse
 from endoscope_core.physics import JointParameters, PlantDescription, SensorModel, simulate
 from endoscope_core.signals import calibration_motion, periodic_signal
 from endoscope_lab.concealed import sliding_nodes
+from endoscope_lab.dataset import configuration_of_size, random_instrument
+from endoscope_lab.dataset.rig_variation import calibration_command
 
 TICK, NODES, SPREAD = 1e-3, 12, 0.7
 

@@ -12,7 +12,7 @@ from endoscope_lab.commands import BENCHES
 def test_the_package_brings_its_commands():
     entries = importlib.metadata.distribution('endoscope_lab').entry_points
     commands = entries.select(group=GROUP)
-    assert {command.name for command in commands} == {'bench', 'prove'}
+    assert {command.name for command in commands} == {'bench', 'dataset', 'fit', 'prove', 'train'}
     assert all(callable(command.load().run) for command in commands)
 
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from endoscope_core.classifier.classification import UnseenTensionError
-from endoscope_core.classifier.held_out_calibration import STRANGE
 from endoscope_core.classifier.weights_file import load_classifier
-from endoscope_core.dataset import record_calibration
 from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
+from endoscope_lab.dataset import record_calibration
 from endoscope_lab.papers.tracking_trial import never_seen_tube
+from endoscope_lab.training.held_out_calibration import STRANGE
 
 
 @pytest.fixture(scope='module', params=CALIBRATION_MOTIONS)

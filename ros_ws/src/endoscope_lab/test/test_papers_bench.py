@@ -50,7 +50,7 @@ def test_without_pytorch_one_line_says_how_to_get_it(command, tmp_path, monkeypa
     monkeypatch.setitem(sys.modules, 'torch', None)
     for name in (
         'endoscope_lab.papers.networks',
-        'endoscope_core.classifier.network',
+        'endoscope_lab.training.network',
     ):
         monkeypatch.delitem(sys.modules, name, raising=False)
     assert main(command) == 2

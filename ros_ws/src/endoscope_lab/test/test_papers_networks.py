@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
+from endoscope_lab.dataset import CLASSES_DEG, CalibrationDataset
 
 torch = pytest.importorskip('torch', reason='PyTorch is missing: make -C ros_ws train')
 
-from endoscope_core.classifier.network import TensionCnn  # noqa: E402
 from endoscope_lab.papers.networks import (  # noqa: E402
     TrainingSettings,
     cross_validate,
@@ -16,6 +15,7 @@ from endoscope_lab.papers.networks import (  # noqa: E402
     train_network,
     use_one_thread,
 )
+from endoscope_lab.training.network import TensionCnn  # noqa: E402
 
 SHORT = TrainingSettings(batch_size=14, epochs=60, learning_rate=3e-3, decay=0.97)
 

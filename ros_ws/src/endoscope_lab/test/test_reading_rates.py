@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from endoscope_core.classifier.weights_file import load_classifier
-from endoscope_core.dataset import CLASSES_DEG
 from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
+from endoscope_lab.dataset import CLASSES_DEG
 from endoscope_lab.papers.calibrations import judged_at_rate, tubes_of_classes
 
 

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 from outside_data import REAL, needs
 
-from endoscope_core.dataset import random_instrument
-from endoscope_core.dataset.rig_variation import backlash_sizes, calibration_command, in_tube
 from endoscope_core.metrics import width_at_mid_height
 from endoscope_core.physics import simulate
 from endoscope_core.signals import calibration_motion
+from endoscope_lab.dataset import random_instrument
+from endoscope_lab.dataset.rig_variation import backlash_sizes, calibration_command, in_tube
 from endoscope_lab.papers.real_recordings import leave_one_out_errors, tension_loop_width
 
 

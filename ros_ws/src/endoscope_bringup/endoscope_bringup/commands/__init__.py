@@ -17,8 +17,6 @@ COMMANDS: tuple[str, ...] = (
     'record',
     'replay',
     'bag',
-    'dataset',
-    'train',
     'identify',
     'effects',
     'doctor',

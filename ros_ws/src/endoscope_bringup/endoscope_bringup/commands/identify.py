@@ -1,14 +1,11 @@
-"""`endoscope identify`: hysteresis parameters from a bag, or a set for each class of a data set.
-
-`endoscope identify family` identifies the rig itself from recordings of its tubes.
-"""
+"""`endoscope identify`: hysteresis parameters from a bag."""
 
 import argparse
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from endoscope_bringup.subcommands import COUNT, seed, within
+from endoscope_bringup.subcommands import seed, within
 from endoscope_core.choices import HYSTERESIS_MODELS, PHYSICAL
 from endoscope_core.errors import FileError
 
@@ -25,28 +22,11 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser = subparsers.add_parser(
         'identify',
         help='fit a hysteresis model to a recording',
-        description='Fits a hysteresis model to each joint of a bag, or to each class of a data '
-        'set, and the feed-forward that goes with it. Prints JSON, or writes it to FILE. '
-        'With `family FOLDER`: identifies the rig from recordings of all its tubes (text files '
-        '0.txt, 60.txt, ... named by the bend in deg), fitted to the first cycle of each and '
-        'judged on the second, beside friction lumped at the ends.',
+        description='Fits a hysteresis model to each joint of a bag, and the feed-forward that '
+        'goes with it. Prints JSON, or writes it to FILE.',
     )
-    parser.add_argument(
-        'source',
-        type=Path,
-        metavar='BAG|DATASET|family',
-        help='rosbag2 folder, .mcap, data set of `endoscope dataset`, or the word family',
-    )
-    parser.add_argument(
-        'folder', type=Path, nargs='?', metavar='FOLDER', help='recordings of tubes, for family'
-    )
-    parser.add_argument('--model', choices=MODELS, help='the model; needed but for family')
-    parser.add_argument(
-        '--output', type=Path, metavar='FILE', help='of family: YAML file for the numbers'
-    )
-    parser.add_argument(
-        '--figure', type=Path, metavar='FILE', help='of family: PNG of simulated on recorded loops'
-    )
+    parser.add_argument('source', type=Path, metavar='BAG', help='rosbag2 folder or .mcap')
+    parser.add_argument('--model', choices=MODELS, required=True, help='the model')
     parser.add_argument(
         '--table',
         type=Path,
@@ -60,13 +40,6 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         type=within(1e-3, 1e3, float),
         help='motor shaft angle for one radian at the joint (that of the rig in BAG)',
     )
-    parser.add_argument(
-        '--per-class',
-        type=COUNT,
-        default=30,
-        metavar='N',
-        help='of a data set, use at most N recordings of each class (30)',
-    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -74,21 +47,14 @@ def run(args: argparse.Namespace) -> int:
     import json
 
     from endoscope_core.atomic_output import require_place, write_text
-    from endoscope_core.dataset import is_dataset
     from endoscope_core.errors import EndoscopeError
 
-    for file in (args.out, args.output, args.figure, args.table):
+    for file in (args.out, args.table):
         if file is not None:
             require_place(file)
-    if args.folder is not None:
-        return _of_tubes(args)
-    if args.output is not None or args.figure is not None:
-        raise EndoscopeError('--output and --figure are for `identify family FOLDER`')
-    if args.model is None:
-        raise EndoscopeError(f'no --model: choose one of {", ".join(MODELS)}')
-    if args.table is not None and (is_dataset(args.source) or args.model == PHYSICAL):
-        raise EndoscopeError('--table takes a bag and the name of a hysteresis model')
-    content = _of_dataset(args) if is_dataset(args.source) else _of_bag(args)
+    if args.table is not None and args.model == PHYSICAL:
+        raise EndoscopeError('--table takes the name of a hysteresis model')
+    content = _of_bag(args)
     text = json.dumps(content, indent=1) + '\n'
     if args.out is None:
         sys.stdout.write(text)
@@ -98,48 +64,8 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _of_tubes(args: argparse.Namespace) -> int:
-    from endoscope_bringup.learning.family_of_recordings import drawn, identified, table
-    from endoscope_core.atomic_output import atomic_file
-    from endoscope_core.errors import EndoscopeError
-    from endoscope_core.identification.family_fit import tube_recordings
-
-    if args.source != Path('family') or args.model is not None or args.table is not None:
-        raise EndoscopeError('a second place is taken by `identify family FOLDER` alone, no model')
-    recordings = tube_recordings(args.folder)
-    options = '' if args.output is None else f' --output {args.output.name}'
-    command = f'endoscope identify family {args.folder.name}{options} --seed {args.seed}'
-    found = identified(recordings, args.seed, command, _report)
-    print(table(recordings, found))
-    if args.output is not None:
-        found.family.save(args.output)
-        _report(f'{args.output}: written')
-    if args.figure is not None:
-        with atomic_file(args.figure) as path:
-            drawn(recordings, found.family).savefig(path, format='png', dpi=90)
-        _report(f'{args.figure}: written')
-    return 0
-
-
-def _of_dataset(args: argparse.Namespace) -> dict[str, object]:
-    from endoscope_core.control import FeedforwardSettings
-    from endoscope_core.dataset import load_dataset
-    from endoscope_core.identification import class_parameter_sets, identify_classes
-
-    dataset = load_dataset(args.source)
-    lead = FeedforwardSettings().lead
-    found = identify_classes(dataset, lead, args.seed, args.per_class, _report, args.model)
-    made = dataset.manifest
-    command = (
-        f'endoscope dataset --seed {made["seed"]} --n {len(dataset.class_deg)} '
-        f'--out DATA && endoscope identify DATA --model {args.model} --seed {args.seed} '
-        f'--per-class {args.per_class}'
-    )
-    return class_parameter_sets(found, command, dataset.manifest_hash, lead, args.model)
-
-
 def _of_bag(args: argparse.Namespace) -> dict[str, object]:
-    from endoscope_bringup.learning.joints_of_bag import hysteresis_of_bag
+    from endoscope_bringup.joints_of_bag import hysteresis_of_bag
     from endoscope_core.control import FeedforwardSettings
     from endoscope_core.identification import Servo, fit_feedforward, fit_model
 
@@ -170,7 +96,7 @@ def _bag_and_gear(args: argparse.Namespace) -> tuple['Bag', float]:
 
 
 def _plant_of_bag(args: argparse.Namespace) -> dict[str, object]:
-    from endoscope_bringup.learning.joints_of_bag import plant_recordings_of_bag
+    from endoscope_bringup.joints_of_bag import plant_recordings_of_bag
     from endoscope_core.identification import fit_plant
 
     joints: dict[str, object] = {}
@@ -200,7 +126,7 @@ def _extend(
 
     import numpy as np
 
-    from endoscope_bringup.learning.joints_of_bag import GRID_STEP
+    from endoscope_bringup.joints_of_bag import GRID_STEP
     from endoscope_core.identification import Servo, TableEntry, UpdatedTable
     from endoscope_core.metrics import width_at_mid_height
 

@@ -1,8 +1,6 @@
 """Parameters of hysteresis models from recordings."""
 
 from endoscope_core.identification.class_parameters import (
-    class_parameter_sets,
-    identify_classes,
     load_class_parameters,
     parameters_for_class,
 )
@@ -29,11 +27,9 @@ __all__ = [
     'TableEntry',
     'UpdatedTable',
     'blend',
-    'class_parameter_sets',
     'fit_feedforward',
     'fit_model',
     'fit_plant',
-    'identify_classes',
     'load_class_parameters',
     'parameters_for_class',
 ]

@@ -15,21 +15,21 @@ from endoscope_core.classifier.classification import (
     nearest_class,
 )
 from endoscope_core.classifier.cnn_classifier import CnnClassifier, first, logarithm, stretched
-from endoscope_core.classifier.held_out_calibration import (
+from endoscope_core.classifier.weights_file import load_classifier
+from endoscope_core.physics import SensorModel, simulate
+from endoscope_core.physics.description import SensorParameters
+from endoscope_core.signals import CALIBRATION_RATE, CalibrationMotion, calibration_motion
+from endoscope_lab.dataset import CLASSES_DEG
+from endoscope_lab.dataset.rig_variation import calibration_command
+from endoscope_lab.dataset.training_rigs import training_rigs
+from endoscope_lab.papers.row import PapersBench
+from endoscope_lab.papers.tracking_trial import configuration_of
+from endoscope_lab.training.held_out_calibration import (
     STRANGE,
     drifting,
     exchanged_across_joints,
     read,
 )
-from endoscope_core.classifier.weights_file import load_classifier
-from endoscope_core.dataset import CLASSES_DEG
-from endoscope_core.dataset.rig_variation import calibration_command
-from endoscope_core.dataset.training_rigs import training_rigs
-from endoscope_core.physics import SensorModel, simulate
-from endoscope_core.physics.description import SensorParameters
-from endoscope_core.signals import CALIBRATION_RATE, CalibrationMotion, calibration_motion
-from endoscope_lab.papers.row import PapersBench
-from endoscope_lab.papers.tracking_trial import configuration_of
 
 Array = NDArray[np.float64]
 Generator = np.random.Generator

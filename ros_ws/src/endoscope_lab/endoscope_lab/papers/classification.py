@@ -11,7 +11,12 @@ from endoscope_core.classifier.classification import UnseenTensionError
 from endoscope_core.classifier.cnn_classifier import course
 from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_core.control import PhysicalParameters, bending_range
-from endoscope_core.dataset import (
+from endoscope_core.identification import load_class_parameters
+from endoscope_core.identification.plant_fit import plants_of_calibration
+from endoscope_core.physics import PlantDescription
+from endoscope_core.rig import shipped_rig
+from endoscope_core.signals import BRIEF, CALIBRATION_MOTIONS, CALIBRATION_RATE, calibration_motion
+from endoscope_lab.dataset import (
     CLASSES_DEG,
     CalibrationDataset,
     configuration_of_size,
@@ -19,12 +24,7 @@ from endoscope_core.dataset import (
     random_instrument,
     record_calibration,
 )
-from endoscope_core.dataset.rig_variation import GREATEST_UNEVENNESS, TubeConfiguration, in_tube
-from endoscope_core.identification import load_class_parameters
-from endoscope_core.identification.plant_fit import plants_of_calibration
-from endoscope_core.physics import PlantDescription
-from endoscope_core.rig import shipped_rig
-from endoscope_core.signals import BRIEF, CALIBRATION_MOTIONS, CALIBRATION_RATE, calibration_motion
+from endoscope_lab.dataset.rig_variation import GREATEST_UNEVENNESS, TubeConfiguration, in_tube
 from endoscope_lab.papers.real_recordings import (
     RealRecording,
     leave_one_out_errors,

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.classifier.network import TensionCnn, Tensor, nn, torch
-from endoscope_core.dataset import CLASSES_DEG, CalibrationDataset
 from endoscope_core.errors import InputError
+from endoscope_lab.dataset import CLASSES_DEG, CalibrationDataset
+from endoscope_lab.training.network import TensionCnn, Tensor, nn, torch
 
 Rows = NDArray[np.intp]
 

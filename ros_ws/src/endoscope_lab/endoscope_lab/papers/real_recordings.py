@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from endoscope_core.identification import Recording, fit_model
-from endoscope_core.identification.family_fit import (
+from endoscope_core.metrics import width_at_mid_height
+from endoscope_lab.identification.family_fit import (
     ACTUAL,
     CYCLE_S,
     DESIRED,
@@ -23,7 +24,6 @@ from endoscope_core.identification.family_fit import (
     PHASE,
     POSITIVE,
 )
-from endoscope_core.metrics import width_at_mid_height
 
 Array = NDArray[np.float64]
 

@@ -19,13 +19,6 @@ from endoscope_core.control import (
     bending_range,
 )
 from endoscope_core.control.limits import shipped_limits
-from endoscope_core.dataset import (
-    TubeConfiguration,
-    configuration_of_size,
-    random_instrument,
-    record_calibration,
-)
-from endoscope_core.dataset.rig_variation import GREATEST_UNEVENNESS
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.identification.plant_fit import plants_of_calibration
 from endoscope_core.metrics import tracking_rmse, width_at_mid_height
@@ -33,6 +26,13 @@ from endoscope_core.physics import PlantDescription, PlantSimulator, SensorModel
 from endoscope_core.rig import shipped_rig
 from endoscope_core.safety import BendingRange
 from endoscope_core.signals import Signal
+from endoscope_lab.dataset import (
+    TubeConfiguration,
+    configuration_of_size,
+    random_instrument,
+    record_calibration,
+)
+from endoscope_lab.dataset.rig_variation import GREATEST_UNEVENNESS
 
 TICK = 1.0e-3
 

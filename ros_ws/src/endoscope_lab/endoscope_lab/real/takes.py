@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.errors import EndoscopeError
-from endoscope_core.identification.family_fit import DESIRED, PHASE
 from endoscope_core.physics.description import JointParameters, PlantDescription, SensorParameters
 from endoscope_core.rig import shipped_rig
 from endoscope_explain.observe.observation import JointObservation, observe, with_held_noise
 from endoscope_explain.recording import BENDING, COMMAND, WIRES, Recording, Series
+from endoscope_lab.identification.family_fit import DESIRED, PHASE
 from endoscope_lab.papers.real_recordings import without_repeats
 
 Array = NDArray[np.float64]

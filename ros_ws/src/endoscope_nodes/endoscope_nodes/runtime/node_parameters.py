@@ -232,8 +232,8 @@ class CompensatorParameters:
     )
     parameter_sets: str = parameter(
         '',
-        'file with a parameter set for each class, as `endoscope identify` writes it; empty '
-        'for the one that comes with the project',
+        'file with a parameter set for each class, as `endoscope fit classes` writes it; '
+        'empty for the one that comes with the project',
     )
     lead: float = parameter(
         0.06,

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from endoscope_core.calibration import words_of, zero_errors
-from endoscope_core.dataset import configuration_of_size, random_instrument, record_calibration
 from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
+from endoscope_lab.dataset import configuration_of_size, random_instrument, record_calibration
 
 OFFSETS = np.array([0.58, -0.4, 0.0, 0.1])
 WIRES = ('x_pos', 'x_neg', 'y_pos', 'y_neg')

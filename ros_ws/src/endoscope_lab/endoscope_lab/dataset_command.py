@@ -47,7 +47,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 def run(args: argparse.Namespace) -> int:
     """Make and write the data set; return 0."""
     from endoscope_core.atomic_output import require_free_directory
-    from endoscope_core.dataset import CLASSES_DEG, make_dataset, save_dataset
+    from endoscope_lab.dataset import CLASSES_DEG, make_dataset, save_dataset
 
     require_free_directory(args.out)
     classes = len(CLASSES_DEG)

@@ -15,12 +15,12 @@ from endoscope_core.classifier.cnn_classifier import (
     cnn_shapes,
     course,
 )
-from endoscope_core.classifier.held_out_calibration import calibration_of, widest
 from endoscope_core.classifier.weights_file import load_classifier
-from endoscope_core.dataset import CLASSES_DEG, random_instrument, record_calibration
-from endoscope_core.dataset.rig_variation import backlash_sizes, calibration_command, in_tube
 from endoscope_core.physics import PlantDescription, simulate
 from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
+from endoscope_lab.dataset import CLASSES_DEG, random_instrument, record_calibration
+from endoscope_lab.dataset.rig_variation import backlash_sizes, calibration_command, in_tube
+from endoscope_lab.training.held_out_calibration import calibration_of, widest
 
 
 @pytest.fixture(scope='module', params=CALIBRATION_MOTIONS)

@@ -19,7 +19,14 @@ from endoscope_core.classifier.cnn_classifier import (
     logarithm,
     stretched,
 )
-from endoscope_core.classifier.held_out_calibration import (
+from endoscope_core.errors import EndoscopeError
+from endoscope_lab.dataset import CLASSES_DEG
+from endoscope_lab.dataset.training_rigs import (
+    TrainingRigs,
+    strange_rigs,
+    training_rigs,
+)
+from endoscope_lab.training.held_out_calibration import (
     STRANGE,
     SUBTLE,
     Report,
@@ -28,14 +35,7 @@ from endoscope_core.classifier.held_out_calibration import (
     read,
     read_of_all_kinds,
 )
-from endoscope_core.classifier.network import TensionCnn, Tensor, nn, torch
-from endoscope_core.dataset import CLASSES_DEG
-from endoscope_core.dataset.training_rigs import (
-    TrainingRigs,
-    strange_rigs,
-    training_rigs,
-)
-from endoscope_core.errors import EndoscopeError
+from endoscope_lab.training.network import TensionCnn, Tensor, nn, torch
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]

@@ -3,12 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from endoscope_core.dataset import random_instrument
-from endoscope_core.dataset.rig_variation import in_tube
 from endoscope_core.identification.plant_fit import FITTED, PlantFitError, fit_plant
 from endoscope_core.physics import JointParameters, PlantDescription, SensorModel, simulate
 from endoscope_core.physics.family import CENTRE, shipped_family
 from endoscope_core.rig import load_rig
+from endoscope_lab.dataset import random_instrument
+from endoscope_lab.dataset.rig_variation import in_tube
 
 TIME = np.arange(3500) * 1e-3
 COMMAND = 0.5 * np.pi * np.sin(TIME)

@@ -1,56 +1,21 @@
-"""`endoscope dataset`, `train` and `identify`, one after the other as a person uses them."""
+"""`endoscope dataset`, `train` and `fit`, one after the other as a person uses them."""
 
 import json
 import subprocess
 import sys
 
-import numpy as np
 import pytest
 
-from endoscope_bags import BagWriter, MessageStream
-from endoscope_bags.cdr_encoding import encode_joint_states
-from endoscope_bags.message_types import JOINT_STATE
 from endoscope_bringup.cli import main
 from endoscope_core.classifier.weights_file import load_classifier
-from endoscope_core.dataset import load_dataset
-from endoscope_core.hysteresis import BoucWenParameters, forward
-from endoscope_core.identification import Servo, load_class_parameters
-from endoscope_core.metrics import width_at_mid_height
-from endoscope_core.physics import PlantDescription, simulate
-from endoscope_core.rig import load_rig
-from endoscope_core.signals import motion_by_name
+from endoscope_core.identification import load_class_parameters
+from endoscope_lab.dataset import load_dataset
 
 
 @pytest.fixture(scope='module')
 def data(tmp_path_factory):
     folder = tmp_path_factory.mktemp('learning') / 'data'
     assert main(['dataset', '--out', str(folder), '--seed', '5', '--n', '14']) == 0
-    return folder
-
-
-@pytest.fixture(scope='module')
-def calibration():
-    """Stamps, desired angle and the answer of the nominal rig to the calibration motion."""
-    angle, _ = motion_by_name('calibration').sample(np.arange(0.0, 10.0, 1e-3))
-    trajectory = simulate(PlantDescription(), angle * load_rig().joints.gear)
-    stamps = 1_700_000_000_000_000_000 + np.arange(0, 10_000) * 1_000_000
-    return stamps, angle, trajectory
-
-
-def write_bag(folder, streams):
-    with BagWriter(folder) as writer:
-        writer.write_streams(
-            [
-                MessageStream(
-                    topic,
-                    JOINT_STATE,
-                    encode_joint_states(names, stamps, position=values),
-                    stamps + 7,
-                    stamps + 5,
-                )
-                for topic, names, stamps, values in streams
-            ]
-        )
     return folder
 
 
@@ -109,7 +74,7 @@ def test_a_data_set_without_room_on_the_disk_is_named(tmp_path):
 def test_without_pytorch_one_line_says_how_to_get_it(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, 'torch', None)
-    for name in ('endoscope_core.classifier.cnn_training', 'endoscope_core.classifier.network'):
+    for name in ('endoscope_lab.training.cnn_training', 'endoscope_lab.training.network'):
         monkeypatch.delitem(sys.modules, name, raising=False)
     assert main(['train', '--out', 'weights.safetensors']) == 2
     assert capsys.readouterr().err == (
@@ -122,7 +87,7 @@ def test_without_pytorch_one_line_says_how_to_get_it(tmp_path, monkeypatch, caps
 def test_identifying_a_data_set_gives_a_set_for_each_class(data, tmp_path):
     out = tmp_path / 'classes.json'
     source = [str(data), '--model', 'bouc_wen', '--per-class', '1', '--out', str(out)]
-    assert main(['identify', *source]) == 0
+    assert main(['fit', 'classes', *source]) == 0
     sets = load_class_parameters(out)
     assert sorted(sets) == [40, 50, 60, 70, 80, 90, 100]
     assert sets[100].lag > 1.5 * sets[40].lag
@@ -130,54 +95,13 @@ def test_identifying_a_data_set_gives_a_set_for_each_class(data, tmp_path):
     assert written['dataset_manifest_sha256'] == load_dataset(data).manifest_hash
 
 
-@pytest.mark.parametrize('driver', ['motor/measured_js', 'motor/servo_jp', 'slave/servo_jp'])
-def test_identifying_a_bag_finds_the_width_of_its_loop(calibration, tmp_path, driver, capsys):
-    stamps, angle, trajectory = calibration
-    bending = trajectory.bending[::25, :1]
-    names = ['bend_x'] if driver.startswith('slave') else ['motor_x']
-    values = {
-        'motor/measured_js': trajectory.shaft_position[:, :1],
-        'motor/servo_jp': 0.5 * angle[:, :1],
-        'slave/servo_jp': angle[:, :1],
-    }[driver]
-    bag = write_bag(
-        tmp_path / 'bag',
-        [
-            (f'/rig/{driver}', names, stamps, values),
-            ('/rig/slave/measured_js', ['bend_x'], stamps[::25], bending),
-        ],
-    )
-    assert main(['identify', str(bag), '--model', 'bouc_wen']) == 0
-    found = json.loads(capsys.readouterr().out)['joints']
-    assert list(found) == ['bend_x']
-    model = BoucWenParameters.from_dict(found['bend_x']['model'])
-    settled = slice(2717, 9000)
-    width = width_at_mid_height(angle[settled, 0], trajectory.bending[settled, 0])
-    modelled = forward(model, Servo().answer(angle[:, 0], 1e-3))
-    assert width_at_mid_height(angle[settled, 0], modelled[settled]) == pytest.approx(
-        width, abs=np.deg2rad(2.0)
-    )
-    assert found['bend_x']['model_rmse'] < np.deg2rad(1.5)
-
-
-def test_a_bag_that_does_not_say_what_the_motors_did_is_refused(calibration, tmp_path, capsys):
-    stamps, _, trajectory = calibration
-    bag = write_bag(
-        tmp_path / 'bag',
-        [('/rig/slave/measured_js', ['bend_x'], stamps[::25], trajectory.bending[::25, :1])],
-    )
-    assert main(['identify', str(bag), '--model', 'bouc_wen']) == 2
-    error = capsys.readouterr().err
-    assert 'motor/measured_js' in error
-    assert error.count('\n') == 1
-
-
 @pytest.mark.parametrize(
     'command',
     [
-        ['identify', 'nowhere', '--model', 'bouc_wen'],
-        ['identify', 'nowhere', '--model', 'unheard_of'],
-        ['identify', 'nowhere'],
+        ['fit', 'classes', 'nowhere', '--model', 'bouc_wen', '--out', 'x.json'],
+        ['fit', 'classes', 'nowhere', '--model', 'unheard_of', '--out', 'x.json'],
+        ['fit', 'family', 'nowhere'],
+        ['fit'],
         ['train', '--motion', 'breif', '--out', 'x.safetensors'],
         ['train', '--out', 'x.json'],
         ['dataset', '--out', 'x', '--n', '0'],

@@ -7,8 +7,8 @@ from endoscope_core.classifier.cnn_classifier import INPUT, evaluated
 
 torch = pytest.importorskip('torch', reason='PyTorch is missing: make -C ros_ws train')
 
-from endoscope_core.classifier.cnn_training import CnnTraining, loss_of, train_cnn  # noqa: E402
-from endoscope_core.classifier.network import TensionCnn  # noqa: E402
+from endoscope_lab.training.cnn_training import CnnTraining, loss_of, train_cnn  # noqa: E402
+from endoscope_lab.training.network import TensionCnn  # noqa: E402
 
 
 def test_judging_without_pytorch_gives_what_pytorch_gives():
@@ -36,7 +36,7 @@ def test_the_loss_is_least_for_the_truth():
 
 
 def test_an_interrupted_training_goes_on_to_the_same_weights(tmp_path, monkeypatch):
-    from endoscope_core.classifier import cnn_training
+    from endoscope_lab.training import cnn_training
 
     monkeypatch.setattr(cnn_training, 'KEPT_EVERY', 2)
     settings = CnnTraining(rigs=6, strange=3, held_out=6, steps=4, batch=8, warm_up=2)

@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     if args.plots is not None:
         require_free_directory(args.plots)
     calibration_motion(args.motion)
-    from endoscope_core.classifier.cnn_training import CnnTraining, description_of, train_cnn
+    from endoscope_lab.training.cnn_training import CnnTraining, description_of, train_cnn
 
     settings = CnnTraining.of_size(args.n, args.steps)
     kept = out.with_name(f'{out.name}.part')

@@ -7,18 +7,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.dataset.calibration_dataset import CLASSES_DEG
-from endoscope_core.dataset.rig_variation import (
-    GREATEST_UNEVENNESS,
-    calibration_command,
-    in_tube,
-    random_instrument,
-)
 from endoscope_core.metrics import NoLoopError, width_at_mid_height
 from endoscope_core.physics import EffectSpec, PlantDescription, PlantTrajectory, simulate
 from endoscope_core.physics.description import JointParameters
 from endoscope_core.physics.family import MOST_BENT, shipped_family
 from endoscope_core.signals import CALIBRATION_RATE, CalibrationMotion, calibration_motion
+from endoscope_lab.dataset.calibration_dataset import CLASSES_DEG
+from endoscope_lab.dataset.rig_variation import (
+    GREATEST_UNEVENNESS,
+    calibration_command,
+    in_tube,
+    random_instrument,
+)
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]

@@ -1,6 +1,6 @@
 """Simulated calibration recordings of known backlash size."""
 
-from endoscope_core.dataset.calibration_dataset import (
+from endoscope_lab.dataset.calibration_dataset import (
     CLASSES_DEG,
     CalibrationDataset,
     CalibrationRecording,
@@ -10,7 +10,7 @@ from endoscope_core.dataset.calibration_dataset import (
     record_calibration,
     save_dataset,
 )
-from endoscope_core.dataset.rig_variation import (
+from endoscope_lab.dataset.rig_variation import (
     TubeConfiguration,
     configuration_of_size,
     random_instrument,

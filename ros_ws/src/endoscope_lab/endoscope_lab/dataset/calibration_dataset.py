@@ -11,7 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.atomic_output import atomic_directory
-from endoscope_core.dataset.rig_variation import (
+from endoscope_core.errors import FileError, InputError
+from endoscope_core.physics import PlantDescription, SensorModel, simulate
+from endoscope_core.signals import CALIBRATION_RATE, SINUSOID, CalibrationMotion, calibration_motion
+from endoscope_lab.dataset.rig_variation import (
     GREATEST_UNEVENNESS,
     Instrument,
     TubeConfiguration,
@@ -20,9 +23,6 @@ from endoscope_core.dataset.rig_variation import (
     random_instrument,
     with_pretension_reset,
 )
-from endoscope_core.errors import FileError, InputError
-from endoscope_core.physics import PlantDescription, SensorModel, simulate
-from endoscope_core.signals import CALIBRATION_RATE, SINUSOID, CalibrationMotion, calibration_motion
 
 CLASSES_DEG = (40, 50, 60, 70, 80, 90, 100)
 """Sizes of backlash that the classifier tells apart, deg."""

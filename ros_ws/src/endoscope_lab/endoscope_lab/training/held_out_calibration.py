@@ -16,8 +16,8 @@ from endoscope_core.classifier.cnn_classifier import (
     logarithm,
     stretched,
 )
-from endoscope_core.dataset import CLASSES_DEG
-from endoscope_core.dataset.training_rigs import held_out_rigs
+from endoscope_lab.dataset import CLASSES_DEG
+from endoscope_lab.dataset.training_rigs import held_out_rigs
 
 Single = NDArray[np.float32]
 Generator = np.random.Generator

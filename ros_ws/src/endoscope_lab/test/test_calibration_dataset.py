@@ -3,7 +3,10 @@ import json
 import numpy as np
 import pytest
 
-from endoscope_core.dataset import (
+from endoscope_core.errors import FileError, InputError
+from endoscope_core.metrics import width_at_mid_height
+from endoscope_core.signals import calibration_sinusoid
+from endoscope_lab.dataset import (
     CLASSES_DEG,
     configuration_of_size,
     load_dataset,
@@ -12,11 +15,8 @@ from endoscope_core.dataset import (
     record_calibration,
     save_dataset,
 )
-from endoscope_core.dataset.calibration_dataset import ARRAYS_FILE, MANIFEST_FILE
-from endoscope_core.dataset.rig_variation import GREATEST_UNEVENNESS, backlash_sizes, in_tube
-from endoscope_core.errors import FileError, InputError
-from endoscope_core.metrics import width_at_mid_height
-from endoscope_core.signals import calibration_sinusoid
+from endoscope_lab.dataset.calibration_dataset import ARRAYS_FILE, MANIFEST_FILE
+from endoscope_lab.dataset.rig_variation import GREATEST_UNEVENNESS, backlash_sizes, in_tube
 
 
 @pytest.fixture(scope='module')

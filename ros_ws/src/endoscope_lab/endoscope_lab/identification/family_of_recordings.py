@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from endoscope_core.identification.family_fit import (
+from endoscope_core.physics.family import TubeFamily
+from endoscope_lab.identification.family_fit import (
     LUMPED,
     TubeRecording,
     figures,
@@ -17,7 +18,6 @@ from endoscope_core.identification.family_fit import (
     misfit,
     read,
 )
-from endoscope_core.physics.family import TubeFamily
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

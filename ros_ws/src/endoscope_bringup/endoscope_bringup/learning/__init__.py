@@ -1,1 +1,0 @@
-"""What identification takes from bags."""

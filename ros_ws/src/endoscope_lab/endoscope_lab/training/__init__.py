@@ -1,0 +1,1 @@
+"""Training of the first paper's network, and how far it is to be trusted."""
