@@ -1,7 +1,6 @@
 """Damaged and crafted files: one line or a right answer, little memory, no traceback."""
 
 import math
-import pickle
 import re
 import shutil
 import struct
@@ -10,7 +9,6 @@ import sys
 import warnings
 import zlib
 from dataclasses import asdict
-from pathlib import Path
 
 import lz4.frame
 import numpy as np
@@ -149,7 +147,6 @@ class Files:
     def __init__(self, folder):
         self.folder = folder
         self.sound = {}
-        self.mark = folder / 'ran'
         plant = PlantDescription(
             effects=(EffectSpec('gravity', 'bend_x', {'moment_nm': 0.01}),),
             terms=(TermSpec('bend_x', 'load_of_angle', '0.01*tanh(q/0.5)', range=(-1.5, 1.5)),),
@@ -274,26 +271,6 @@ def test_whatever_a_file_holds_is_one_line_or_a_right_answer(files, kind, exampl
             path.write_bytes(sound)
 
     tried()
-
-
-class Program:
-    """Unpickled, it would make a folder."""
-
-    def __init__(self, mark):
-        self.mark = mark
-
-    def __reduce__(self):
-        return Path.mkdir, (self.mark,)
-
-
-def test_weights_are_no_program(files):
-    path = files.path('weights.safetensors')
-    sound = files.sound_bytes('weights.safetensors')
-    path.write_bytes(pickle.dumps(Program(files.mark)))
-    with pytest.raises(EndoscopeError):
-        load_classifier(path, SINUSOID)
-    assert not files.mark.exists()
-    path.write_bytes(sound)
 
 
 # ---- recordings that were built by hand
@@ -475,8 +452,6 @@ def test_names_do_not_steer_a_terminal(path, tmp_path, capsys):
         ("compression_mode: ''", 'compression_mode: [FILE]', 'compression mode'),
         ('storage_identifier: mcap', 'storage_identifier: 7', 'storage 7'),
         ('version: 9', 'version: ' + '9' * 5000, 'a number of 5000 characters'),
-        ('version: 9', 'version: ' + '[' * 5000, 'nested deeper'),
-        ('version: 9', 'version: 9\n  version: 10', "key 'version' is given twice"),
         ('version: 9', 'version: &v 9\n  again: *v', 'refers to another place'),
     ],
 )
@@ -505,10 +480,7 @@ def test_joints_that_every_message_names_anew_are_refused(path):
     ('new', 'what'),
     [
         ('1.0e+308', 'give a number from 0 to 1000 N'),
-        ('5.0\n    pretension: 6.0', 'line 4: key .* given twice'),
         ('9' * 5000, 'line 3: a number of 5000 characters'),
-        ('[' * 5000, 'line 3: nested deeper'),
-        ('2026-13-01', 'line 3: month must be in 1..12'),
         ('"\\e[2J"', r'\\x1b\[2J'),
     ],
 )

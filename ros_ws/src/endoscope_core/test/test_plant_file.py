@@ -74,17 +74,14 @@ def test_a_number_without_a_dot_before_its_exponent_is_a_number(tmp_path):
             'joints: {bend_x: {pretension: five}}',
             "joints.bend_x.pretension is 'five': give a number",
         ),
-        ('joints: {bend_x: {pretension: true}}', 'give a number'),
         (
             'joints: {bend_x: {wire_stiffness: -1}}',
             'wire_stiffness is -1: give a number from 1 to 1e.07 N/m',
         ),
         ('joints: {bend_x: {wire_stiffness: .nan}}', 'wire_stiffness is nan: give a number from 1'),
-        ('joints: [bend_x]', r'joints is \[.bend_x.\]: give a mapping'),
         ('sensors: {tracker_nois: 1}', 'did you mean tracker_noise'),
         ('sensors: {tracker_rate: 0}', 'tracker_rate is 0: give a number from 0.1 to 100000 Hz'),
         ('effects: {}\njoint: 1', 'unknown key joint: did you mean joints'),
-        ('effects: gravity', 'effects is .gravity.: give a list'),
         ('effects: [{joint: bend_x}]', r'effects\[0\].id is missing: give a text'),
         ('effects: [{id: gravity}]', r'effects\[0\].joint is missing: give a text'),
         ('effects: [{id: gravty, joint: bend_x}]', 'unknown effect gravty: did you mean gravity'),
@@ -98,24 +95,15 @@ def test_a_number_without_a_dot_before_its_exponent_is_a_number(tmp_path):
             'gravity: moment_nm is 9, it must be between 0 and 0.1 N m',
         ),
         ('joints: {bend_x: }\neffects: [{id: gravity, joint: bend_y}]', 'joint bend_y'),
-        ('a: [', 'is not YAML'),
-        (
-            'joints: {bend_x: {pretension: 1e308}}',
-            'pretension is .?1.*308.?: give a number from 0 to 1000 N',
-        ),
         (
             'joints: {bend_x: {pretension: 1.0e+308}}',
             'pretension is .?1.*308.?: give a number from 0 to 1000 N',
         ),
         ('sensors: {encoder_counts: 1e12}', 'give a number from 1 to 4.29497e.09 counts a turn'),
-        ('joints: {bend_x: {pretension: 5,\n pretension: 6}}', 'line 2: key .* is given twice'),
-        ('joints: {bend_x: {pretension: ' + '9' * 5000 + '}}', 'line 1: a number of 5000 char'),
         (
             'effects: [{id: gravity, joint: bend_x, parameters: {5: 1}}]',
             'parameters: key 5 is no name: put it in quotes',
         ),
-        ('joints: ' + '[' * 5000, 'line 1: nested deeper than'),
-        ('joints: &all {bend_x: }\nsensors: *all', 'line 2: .all refers to another place'),
     ],
 )
 def test_what_is_wrong_is_named_in_one_line(tmp_path, text, message):
@@ -124,18 +112,6 @@ def test_what_is_wrong_is_named_in_one_line(tmp_path, text, message):
         load_plant(path)
     assert str(path) in str(caught.value)
     assert '\n' not in str(caught.value)
-
-
-def test_a_file_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(FileError, match=r'plant file: cannot read .*none\.yaml'):
-        load_plant(tmp_path / 'none.yaml')
-
-
-def test_a_file_that_is_not_text_is_refused(tmp_path):
-    path = tmp_path / 'plant.yaml'
-    path.write_bytes(b'\xff\xfe\x00\x80')
-    with pytest.raises(FileError, match='is not YAML'):
-        load_plant(path)
 
 
 def test_every_parameter_has_a_reach_that_holds_its_nominal_value():
