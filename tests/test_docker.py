@@ -79,7 +79,8 @@ def test_the_page_is_served_with_options_that_it_has_and_starts_no_second_graph(
 
 def test_the_image_is_built_once_and_pulled_never() -> None:
     services = _interpolated(COMPOSE_FILE).values()
-    assert len([service for service in services if 'build' in service]) == 1
+    [built] = [service['build'] for service in services if 'build' in service]
+    assert built['target'] == 'robot'
     assert {service['pull_policy'] for service in services} == {'never'}
 
 
@@ -165,11 +166,15 @@ def test_hardware_takes_nothing_of_that_back() -> None:
 
 def test_the_image_is_built_on_what_is_pinned_and_runs_as_nobody_special() -> None:
     lines = (ROOT / 'docker' / 'Dockerfile').read_text().splitlines()
-    assert [line for line in lines if line.startswith('FROM')] == ['FROM ${ROS_IMAGE}']
+    stages = [line for line in lines if line.startswith('FROM')]
+    assert stages == ['FROM ${ROS_IMAGE} AS robot', 'FROM robot AS lab']
     [image] = [line for line in lines if line.startswith('ARG ROS_IMAGE')]
     assert re.fullmatch(r'ARG ROS_IMAGE=ros:jazzy@sha256:[0-9a-f]{64}', image)
-    [user] = [line.split()[1] for line in lines if line.startswith('USER')]
-    assert user.split(':')[0] not in ('0', 'root')
+    # A stage ends as nobody special, whoever installs something in between.
+    robot, lab = ' '.join(lines).split(stages[1])
+    for stage in (robot, lab):
+        user = stage.split('USER ')[-1].split()[0]
+        assert user.split(':')[0] not in ('0', 'root')
 
 
 def test_compose_accepts_the_file() -> None:
