@@ -21,6 +21,7 @@ from endoscope_core.physics import JointParameters, SensorParameters
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_explain.report.sentences import EVIDENCE
+from endoscope_explain.report.writing import KEYS
 from endoscope_nodes import program
 from endoscope_nodes.runtime.node_parameters import OF_NODE, OF_PROCESS
 from endoscope_nodes.runtime.parameters import described
@@ -150,6 +151,18 @@ def test_pages_keep_what_the_code_says(tmp_path: Path) -> None:
     assert stale == [], 'run `make -C ros_ws reference` and commit what it writes'
 
 
+def test_the_interface_that_others_rely_on_stands_in_the_reference() -> None:
+    topics, report = (
+        (WORKSPACE / f'doc/reference/{page}.md').read_text() for page in ('topics', 'report')
+    )
+    for name in (
+        *('motor/setpoint_js', 'rig/kind', 'recorder/mark', 'watch/restart'),
+        *('compensator/adopt', 'compensator/plant', 'calibration/feedback', 'calibration/numbers'),
+    ):
+        assert f'| `{name}` | ' in topics, name
+    assert '| `rig` | ' in report
+
+
 def test_reference_pages_can_be_read_without_the_site() -> None:
     pages = sorted((WORKSPACE / 'doc/reference').glob('*.md'))
     text = {page.stem: page.read_text(encoding='utf-8') for page in pages}
@@ -179,6 +192,7 @@ def test_reference_pages_have_everything(site: Path) -> None:
     assert _missing(site, 'parameters', _what_parameters_do()) == []
     assert _missing(site, 'effects', (*CATALOGUE, *FUNCTIONS)) == []
     assert _missing(site, 'plant_file', keys) == []
+    assert _missing(site, 'report', KEYS) == []
     assert _missing(site, 'api_core', ('load_plant', 'simulate', 'PhysicalInverse')) == []
     assert _missing(site, 'api_bags', ('open_bag', 'BagWriter')) == []
     assert _missing(site, 'api_devices', ('AuroraTracker', 'load_calibration')) == []

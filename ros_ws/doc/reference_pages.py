@@ -27,6 +27,7 @@ from endoscope_core.physics.effect import Parameter
 from endoscope_core.physics.effects import KNOWN
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.plant_file import plant_to_mapping
+from endoscope_explain.report.writing import KEYS
 from endoscope_nodes import program
 from endoscope_nodes.runtime.node_parameters import OF_NODE, OF_PROCESS
 from endoscope_nodes.runtime.parameters import Described, as_typed, described
@@ -222,6 +223,11 @@ def _mapping() -> Iterator[str]:
     yield from ('```yaml', *EXAMPLE.splitlines(), '```')
 
 
+def _report() -> Iterator[str]:
+    """The keys of report.json."""
+    yield from _table(('key', 'content'), [(f'`{key}`', what) for key, what in KEYS.items()])
+
+
 def _switch(parameter: Parameter) -> str:
     return ', '.join(f'{_number(v)}: {parameter.said(v)}' for v in parameter.admissible)
 
@@ -326,6 +332,7 @@ PARTS: dict[str, Callable[[], Iterator[str]]] = {
     'effects': _effects,
     'places': _places,
     'mapping': _mapping,
+    'report': _report,
     'api-core': lambda: _modules('endoscope_core', *CORE),
     'api-bags': lambda: _module('endoscope_bags'),
     'api-devices': lambda: _modules('endoscope_devices', *DEVICES),

@@ -19,11 +19,35 @@ from endoscope_explain.case import (
     Place,
     Provenance,
 )
-from endoscope_explain.explanation import Estimate, NamedEffect, NominalEstimate, UnknownTerm
+from endoscope_explain.explanation import (
+    Estimate,
+    NamedEffect,
+    NominalEstimate,
+    UnknownTerm,
+    Verdict,
+)
 from endoscope_explain.fit.free_parameters import tolerance
 from endoscope_explain.report.html_page import html_page
 
 SCHEMA = 1
+KEYS = {
+    'schema': f'version of this form, {SCHEMA}',
+    'verdict': ', '.join(f'`{verdict}`' for verdict in Verdict),
+    'rig': 'what was recorded, as it says on `rig/kind`: `kind` (`simulated`, `emulated`, `real`, '
+    '`unknown`), `program`, `rig_sha256`, `plant` and `plant_sha256`; empty where it says nothing',
+    'where': 'most important first: `stage`, `joint`, `signals`, `intervals` in s from the first '
+    'stamp, `regime` in words, `band_hz`',
+    'effects': 'what was left out, most certain first: `id`, `joint`, `stage`, `probability`, '
+    '`equation`, `source`, `parameters`, `alternatives`, `evidence`',
+    'parameters': 'by joint and name: `nominal`, `value`, `low` and `high` of 90 %, `unit`, '
+    '`in_band`, `shown`, `together_with`',
+    'fit': 'by compared plant (`nominal`, `refitted`, `augmented`) and signal, held out: `rmse`, '
+    '`noise`, `rmse_over_noise`; `validation` has the same of a second recording',
+    'symbolic': 'the missing term as a formula, or null',
+    'next_experiment': '`why`, `separates`, `command`, or null',
+    'runtime_s': 'how long it took',
+}
+"""Of ``report.json``, and what is there."""
 
 
 def report_mapping(case: ExplainedCase) -> dict[str, Any]:
