@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from endoscope_core.control import Handle, HandleRefusal
@@ -159,6 +159,53 @@ def test_a_stamp_that_lies_moves_a_sample_by_no_more_than_the_jitter():
 def test_engaging_a_handle_that_was_never_heard_is_refused():
     with pytest.raises(RuntimeError, match='not been heard'):
         handle().engage((0.0, 0.0))
+
+
+@given(st.integers(1, 6), st.floats(0.05, 5.0), st.floats(-0.4, 0.4), st.floats(-0.4, 0.4))
+@settings(max_examples=15, deadline=None)
+def test_engaging_anew_moves_by_the_scaled_way_each_time_and_comes_back_from_an_end_at_once(
+    engagements, scale, way, back
+):
+    """As with a mouse that is lifted: what the hand does while released moves nothing."""
+    hand, now, slave = handle(scale), 0, 0.0
+
+    def turn(start, end):
+        """Turn the handle within 0.4 s, and rest until the smoothing has settled."""
+        nonlocal now
+        answer = None
+        for k in range(1200):
+            now += MS
+            share = min(1.0, k / 400)
+            assert hand.take(now, (start + share * (end - start), 0.0), now) is None
+            answer = hand.follow(now)
+        return None if answer is None else answer[0][0]
+
+    turn(0.0, 0.0)
+    for _ in range(engagements):
+        hand.engage((slave, 0.0))
+        expected = min(1.5, max(-1.5, slave + scale * way))
+        slave = turn(0.0, way)
+        assert slave == pytest.approx(expected, abs=scale * 2.0 * COUNT + 1e-6)
+        hand.release()
+        assert turn(way, 0.0) is None
+    end = math.copysign(1.5, way)
+    hand.engage((end, 0.0))
+    assert turn(0.0, way) == end
+    hand.engage((end, 0.0))
+    inward = -math.copysign(abs(back), way)
+    expected = end + scale * inward
+    if -1.5 <= expected <= 1.5:
+        assert turn(way, way + inward) == pytest.approx(expected, abs=scale * 2.0 * COUNT + 1e-6)
+
+
+@pytest.mark.parametrize('scale', [math.nan, math.inf, 0.0, -1.0])
+def test_a_scale_that_is_no_positive_number_is_refused(scale):
+    with pytest.raises(ValueError, match='scale = .* must be positive and finite'):
+        handle(scale)
+    hand = handle()
+    with pytest.raises(ValueError, match='scale = '):
+        hand.scale = scale
+    assert hand.scale == 1.0
 
 
 numbers = st.floats(allow_nan=True, allow_infinity=True)

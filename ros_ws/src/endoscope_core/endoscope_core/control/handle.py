@@ -65,7 +65,7 @@ class Handle:
 
     While engaged, ``slave = anchor + scale (handle - handle at engagement)`` within `low` and
     `high` (J,) in rad, the anchor being the slave's measured pose. A change of `scale` counts from
-    the next engagement.
+    the next engagement; ValueError if it is not positive and finite.
     """
 
     def __init__(
@@ -98,6 +98,17 @@ class Handle:
         self._smooth: list[SmoothFollower] = []
         self._followed_ns = 0
         self._anchor = None
+
+    @property
+    def scale(self) -> float:
+        """Motion of the slave for one radian of the handle's."""
+        return self._scale
+
+    @scale.setter
+    def scale(self, value: float) -> None:
+        if not (math.isfinite(value) and value > 0.0):
+            raise ValueError(f'scale = {value} must be positive and finite')
+        self._scale = value
 
     @property
     def interval(self) -> float:
