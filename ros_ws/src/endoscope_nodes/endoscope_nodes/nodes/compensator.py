@@ -6,7 +6,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.parameter import Parameter
 
-from endoscope_core.choices import ADAPTIVE_PHYSICAL, BY_ADOPTED, BY_CLASS, MODES
+from endoscope_core.choices import ADAPTIVE_PHYSICAL, BY_ADOPTED, BY_CLASS
 from endoscope_core.control import (
     AdoptedPlant,
     AdoptionError,
@@ -98,6 +98,7 @@ class CompensatorNode(EndoscopeNode):
         self._passing = Feedforward(len(names.JOINTS))
         self._desired = DesiredMotion(len(names.JOINTS))
         self._choice = LawChoice(len(names.JOINTS), p.parameter_sets, p.table)
+        self._compiled: set[str] = set()
         self._trouble = self._load()
         self.findings: CalibrationFindings | None = None
         self._found: CalibrationFindings | None = None
@@ -214,18 +215,22 @@ class CompensatorNode(EndoscopeNode):
             self._select_law()
 
     def _load(self) -> str:
-        """Load and compile what the first command would wait for; why a mode is not available."""
-        trouble = ''
-        for mode in dict.fromkeys((*MODES, self._settings.mode)):
-            trial = Feedforward(len(names.JOINTS))
-            try:
-                trial.select(self._choice.law(mode, BY_CLASS, _ANY_CLASS))
-            except EndoscopeError as error:
-                trouble = str(error) if mode == self._settings.mode else trouble
-                continue
-            trial.step(_NOTHING, _NOTHING, 1e-3)
-            trial.measure(0.0, _NOTHING)
-        return trouble
+        """Load what the first command would wait for; why the mode is not available."""
+        try:
+            self._compile(self._choice.law(self._settings.mode, BY_CLASS, _ANY_CLASS))
+        except EndoscopeError as error:
+            return str(error)
+        return ''
+
+    def _compile(self, law: FeedforwardLaw) -> None:
+        """Compile a mode before a command needs it, once."""
+        if law.mode in self._compiled:
+            return
+        trial = Feedforward(len(names.JOINTS))
+        trial.select(law)
+        trial.step(_NOTHING, _NOTHING, 1e-3)
+        trial.measure(0.0, _NOTHING)
+        self._compiled.add(law.mode)
 
     def _select_law(self) -> None:
         """Put mode and findings in force; without findings nothing is compensated."""
@@ -240,6 +245,7 @@ class CompensatorNode(EndoscopeNode):
             except EndoscopeError as error:
                 self._trouble = str(error)
         if law != self._feedforward.law:
+            self._compile(law)
             self._feedforward.select(law)
         self._by_adopted = adopted is not None and law == adopted.law
         self._state_is_news = True
