@@ -200,7 +200,7 @@ def test_engaging_anew_moves_by_the_scaled_way_each_time_and_comes_back_from_an_
 
 @pytest.mark.parametrize('scale', [math.nan, math.inf, 0.0, -1.0])
 def test_a_scale_that_is_no_positive_number_is_refused(scale):
-    with pytest.raises(ValueError, match='scale = .* must be positive and finite'):
+    with pytest.raises(ValueError, match=r'scale = .* must be positive and finite'):
         handle(scale)
     hand = handle()
     with pytest.raises(ValueError, match='scale = '):

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from endoscope_core.compiled import compiled
 from endoscope_core.physics.description import SensorParameters
 
 Array = NDArray[np.float64]
@@ -45,28 +46,43 @@ class SensorModel:
 
     def tension(self, tension: ArrayLike) -> Array:
         """Load-cell readings in N."""
-        tension = np.asarray(tension, dtype=float)
-        noise = self._sensors.load_cell_noise * self._cells.standard_normal(tension.shape)
-        return quantise(tension + noise, self._sensors.load_cell_resolution)
+        own = self._sensors
+        return _read(tension, own.load_cell_noise, self._cells, own.load_cell_resolution)
 
     def bending(self, angle: ArrayLike) -> Array:
         """Bending angle in rad from the tracker."""
-        angle = np.asarray(angle, dtype=float)
-        return angle + self._sensors.tracker_noise * self._tracker.standard_normal(angle.shape)
+        return _read(angle, self._sensors.tracker_noise, self._tracker, 0.0)
 
     def shaft_position(self, angle: ArrayLike) -> Array:
         """Encoder reading in rad."""
-        return quantise(angle, 2.0 * math.pi / self._sensors.encoder_counts)
+        return _read(angle, 0.0, None, 2.0 * math.pi / self._sensors.encoder_counts)
 
     def shaft_velocity(self, speed: ArrayLike) -> Array:
         """Servo's velocity reading in rad/s."""
-        return quantise(speed, self._sensors.velocity_resolution)
+        return _read(speed, 0.0, None, self._sensors.velocity_resolution)
 
     def shaft_effort(self, effort: ArrayLike) -> Array:
         """Torque in N m from the servo's current."""
-        effort = np.asarray(effort, dtype=float)
-        noise = self._sensors.effort_noise * self._effort.standard_normal(effort.shape)
-        return quantise(effort + noise, self._sensors.effort_resolution)
+        own = self._sensors
+        return _read(effort, own.effort_noise, self._effort, own.effort_resolution)
+
+
+def _read(
+    values: ArrayLike, noise: float, generator: np.random.Generator | None, step: float
+) -> Array:
+    clean = np.asarray(values, dtype=float)
+    white = clean if generator is None else generator.standard_normal(clean.shape)
+    readings = np.empty(clean.shape)
+    _read_each(clean.ravel(), white.ravel(), noise, step, readings.ravel())
+    return readings
+
+
+@compiled
+def _read_each(values: Array, white: Array, noise: float, step: float, readings: Array) -> None:
+    # Of a tick's few numbers: each call of numpy costs as much as all of this.
+    for k in range(values.size):
+        value = values[k] + noise * white[k]
+        readings[k] = value if step == 0.0 else np.rint(value / step) * step
 
 
 @dataclass(frozen=True)

@@ -82,6 +82,8 @@ class PlantSimulator:
         self._parameters, self._on = pack(plant)
         self._states, self._histories, self._sheaths = rest_state(self._parameters, self._on, tick)
         self._ticks = 0
+        # A tick of a node makes no arrays.
+        self._of_a_tick = self._arrays(1)
         self._advance(np.zeros(len(self.joints)), 0)
 
     @property
@@ -128,14 +130,17 @@ class PlantSimulator:
         return self.sample
 
     def _advance(self, command: Array, n_ticks: int) -> None:
-        inputs = np.zeros((len(self.joints), n_ticks, layout.INPUTS))
+        inputs, out = self._of_a_tick if n_ticks == 1 else self._arrays(n_ticks)
         inputs[:, :, layout.IN_COMMAND] = command[:, None]
-        inputs[:, :, layout.IN_MOTOR] = np.nan
-        out = np.empty((len(self.joints), n_ticks + 1, layout.OUTPUTS))
         arrays = (self._states, self._histories, self._sheaths, self._parameters, self._on)
         run_joints(*arrays, inputs, True, self.tick, out)
         self._readings = out[:, -1]
         self._ticks += n_ticks
+
+    def _arrays(self, n_ticks: int) -> tuple[Array, Array]:
+        inputs = np.zeros((len(self.joints), n_ticks, layout.INPUTS))
+        inputs[:, :, layout.IN_MOTOR] = np.nan
+        return inputs, np.empty((len(self.joints), n_ticks + 1, layout.OUTPUTS))
 
 
 def simulate(

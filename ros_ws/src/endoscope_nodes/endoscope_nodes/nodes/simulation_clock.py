@@ -68,7 +68,14 @@ class SimulationClockNode(EndoscopeNode):
         self._clock_out = self.create_publisher(ClockMessage, context.clock, LOCK_STEP)
         self.ticker.in_flight.landed = self._go_on
         for topic in FOLLOWED:
-            self.create_subscription(JointState, topic, self._answer_to(topic), LOCK_STEP, raw=True)
+            answer = self._answer_to(topic)
+            if self.ticker.in_flight.sent_by_us(self._full_name[topic]):
+                # The next tick waits for its readers as it is.
+                self.ticker.in_flight.note(self._full_name[topic], answer)
+            else:
+                self.create_subscription(
+                    JointState, topic, self._going_on(answer), LOCK_STEP, raw=True
+                )
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(self._look_s, self._look, clock=steady)
         if self._period_ns:
@@ -97,11 +104,19 @@ class SimulationClockNode(EndoscopeNode):
         def answer(data: bytes) -> None:
             seconds, nanoseconds = _STAMP.unpack_from(data, 4)
             answered[topic] = seconds * 1_000_000_000 + nanoseconds
-            if answered[topic] >= self._now_ns and topic in pending:
+            if answered[topic] >= self._now_ns:
                 pending.discard(topic)
-                self._go_on()
 
         return answer
+
+    def _going_on(self, answer: Callable[[bytes], None]) -> Callable[[bytes], None]:
+        def take(data: bytes) -> None:
+            waited = len(self._pending)
+            answer(data)
+            if len(self._pending) < waited:
+                self._go_on()
+
+        return take
 
     @property
     def _is_waiting(self) -> bool:
@@ -144,7 +159,10 @@ class SimulationClockNode(EndoscopeNode):
     def _look(self) -> None:
         """Repeat a tick that may have been lost, give streams up that have ended."""
         self._course.append((time.monotonic_ns(), self._now_ns))
-        if not self._is_waiting or self._future is None:
+        if self._future is None:
+            return
+        if not self._is_waiting:
+            self._go_on()
             return
         # Time in which this process was not run itself has kept nobody from being heard.
         self._looked += 1

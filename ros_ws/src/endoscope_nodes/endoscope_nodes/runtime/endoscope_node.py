@@ -74,8 +74,9 @@ class EndoscopeNode(EventlessNode):
         """Offer a topic; in simulated time the next tick waits for its readers."""
         publisher = super().create_publisher(msg_type, topic, qos_profile, **how)
         if self._is_in_lock_step:
-            counted = self.ticker.in_flight.sent(publisher.topic_name, publisher.publish)
-            publisher.publish = counted  # type: ignore[assignment, method-assign]
+            sent, topic = self.ticker.in_flight.sent, publisher.topic_name
+            publisher.publish = sent(topic, publisher.publish)  # type: ignore[assignment, method-assign]
+            vars(publisher)['publish_raw'] = sent(topic, publisher.handle.publish_raw)
         return publisher
 
     @property

@@ -5,8 +5,9 @@ In simulated time no tick begins before what the nodes sent each other in the la
 
 import struct
 import time
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -37,22 +38,30 @@ class InFlight:
         self.count = 0  # once for each reader
         # Called when the last one has been dealt with.
         self.landed: Callable[[], object] = lambda: None
-        self._sent: Counter[str] = Counter()
+        # Of each topic how many are on their way, in a list of one that its counters share.
+        self._sent: defaultdict[str, list[int]] = defaultdict(lambda: [0])
         self._readers: defaultdict[str, list[Node]] = defaultdict(list)
         self._senders: set[str] = set()
+        self._noted: dict[str, Callable[[Any], object]] = {}
 
     def sent_by_us(self, topic: str) -> bool:
         """Whether a node of this process sends on a topic, given by its full name."""
         return topic in self._senders
 
+    def note(self, topic: str, callback: Callable[[Any], object]) -> None:
+        """Call back with what a node of this process sends on a topic, without a subscription."""
+        self._noted[topic] = callback
+
     def sent[M](self, topic: str, publish: Callable[[M], None]) -> Callable[[M], None]:
         """Count what is published by a function on a topic."""
         self._senders.add(topic)
+        sent, readers, noted = self._sent[topic], self._readers[topic], self._noted
 
         def counted(message: M) -> None:
-            readers = len(self._readers[topic])
-            self._sent[topic] += readers
-            self.count += readers
+            sent[0] += len(readers)
+            self.count += len(readers)
+            if topic in noted:
+                noted[topic](message)
             publish(message)
 
         return counted
@@ -62,14 +71,15 @@ class InFlight:
     ) -> Callable[[M], None]:
         """Count what a node's callback has dealt with."""
         self._readers[topic].append(node)
+        sent = self._sent[topic]
 
         def counted(message: M) -> None:
             try:
                 callback(message)
             finally:
                 # What comes from another process was not counted.
-                if self._sent[topic]:
-                    self._sent[topic] -= 1
+                if sent[0]:
+                    sent[0] -= 1
                     self.count -= 1
                     if not self.count:
                         self.landed()
@@ -78,13 +88,14 @@ class InFlight:
 
     def forget(self, owners: Sequence[object]) -> None:
         """Expect nothing more of these nodes."""
-        for topic, nodes in self._readers.items():
-            self._readers[topic] = [node for node in nodes if node not in owners]
+        for nodes in self._readers.values():
+            nodes[:] = [node for node in nodes if node not in owners]
 
     def give_up(self) -> None:
         """Take what has not come for lost."""
         self.count = 0
-        self._sent.clear()
+        for sent in self._sent.values():
+            sent[0] = 0
 
 
 class Ticker:
