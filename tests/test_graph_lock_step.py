@@ -1,5 +1,8 @@
 """Simulated time: twice the same, the same as the plant alone, a clear word when it stalls."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from simulated_graph import SimulatedGraph
@@ -38,6 +41,31 @@ def test_two_runs_are_the_same_to_the_last_bit():
     for topic in STREAMS:
         assert len(first[topic]) > 0, topic
         assert first[topic] == second[topic], topic
+
+
+def calibration(clock):
+    """Result but for its time, and what was commanded and read until the motion had ended."""
+    overrides = {'calibration': {'motion': 'brief'}, 'conductor': clock}
+    with SimulatedGraph(overrides=overrides) as graph:
+        streams = {topic: graph.listen(topic, names) for topic, names in STREAMS.items()}
+        graph.enable()
+        result = graph.calibrate()
+    end = streams['calibration/servo_jp'][-1].stamp_ns
+    heard = {topic: [s for s in stream if s.stamp_ns <= end] for topic, stream in streams.items()}
+    return {key: value for key, value in result.items() if 'duration' not in key}, heard
+
+
+def test_a_calibration_at_a_pace_beside_busy_processes_is_the_same_to_the_last_bit():
+    alone = calibration({})
+    busy = [subprocess.Popen([sys.executable, '-c', 'while True: pass']) for _ in range(8)]
+    try:
+        beside = calibration({'speed': 5.0})
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
+    assert len(alone[1]['wires/measured_js']) > 1000
+    assert beside == alone
 
 
 def test_another_seed_gives_other_noise():
