@@ -8,7 +8,7 @@ from commanded_graph import Sender
 from simulated_graph import TICK_RATE, SimulatedGraph
 from tubes import tube_of_size
 
-from endoscope_core.control import bending_range
+from endoscope_core.control import MotorLimits, bending_range
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.physics import load_plant
 from endoscope_core.rig import shipped_rig
@@ -24,10 +24,10 @@ from endoscope_nodes.names import (
 from endoscope_nodes.runtime.diagnostics import WARN
 
 
-def rig_of_reach(angle):
-    """The shipped rig with another largest desired bending, in rad."""
+def rig_of(**joints):
+    """The shipped rig with other bounds of its joints, in rad."""
     rig = shipped_rig()
-    return dataclasses.replace(rig, joints=dataclasses.replace(rig.joints, reach=angle))
+    return dataclasses.replace(rig, joints=dataclasses.replace(rig.joints, **joints))
 
 
 def warnings(graph, name):
@@ -35,17 +35,20 @@ def warnings(graph, name):
 
 
 def test_a_calibration_finds_the_reach_and_the_master_keeps_to_it(tmp_path):
-    """In a tube so tight that 60 deg are more than it allows."""
+    """In a tube so tight that 60 deg are more than it allows, by motors that turn less far."""
     overrides = tube_of_size(tmp_path, 80, 1080)
     plant = load_plant(overrides['motor_driver']['plant_file'])
     overrides |= {'calibration': {'motion': 'brief'}}
-    with SimulatedGraph(overrides=overrides) as graph:
+    rig = rig_of(drive=1.9)
+    with SimulatedGraph(overrides=overrides, rig=rig) as graph:
         graph.enable()
         values = graph.calibrate()
         found = [
             [float(values[f'reach.{joint}.{end}']) for end in ('low', 'high')] for joint in JOINTS
         ]
-        true = [(tube.low, tube.high) for tube in map(bending_range, plant.joints.values())]
+        limits = MotorLimits.of(rig)
+        tubes = [bending_range(joint, limits) for joint in plant.joints.values()]
+        true = [(tube.low, tube.high) for tube in tubes]
         np.testing.assert_allclose(np.degrees(found), np.degrees(true), atol=5.0)
         commands = graph.listen(SLAVE_COMMAND)
         graph.set('console', source='motion')
@@ -75,7 +78,7 @@ def test_the_compensator_cuts_what_a_master_asks_for_beyond_it():
 
 
 def test_a_calibration_that_needs_more_than_the_reach_is_refused_and_nothing_moves():
-    with SimulatedGraph(rig=rig_of_reach(1.2)) as graph:
+    with SimulatedGraph(rig=rig_of(reach=1.2)) as graph:
         graph.enable()
         goals = graph.listen(MOTOR_COMMAND, MOTORS)
         answer = graph.call_calibration()
@@ -89,7 +92,7 @@ def test_a_calibration_that_needs_more_than_the_reach_is_refused_and_nothing_mov
 
 def test_nothing_that_a_calibration_commands_leads_beyond_the_reach():
     """Whoever commands it: the compensator has a gate of its own."""
-    with SimulatedGraph(rig=rig_of_reach(0.3), without=['calibration']) as graph:
+    with SimulatedGraph(rig=rig_of(reach=0.3), without=['calibration']) as graph:
         compensator, gear = graph.nodes['compensator'], shipped_rig().joints.gear
         graph.enable()
         sender = Sender(graph, CALIBRATION_COMMAND)
@@ -104,7 +107,7 @@ def test_nothing_that_a_calibration_commands_leads_beyond_the_reach():
 def test_home_leads_back_from_shafts_beyond_the_reach():
     """Compensation turns them further than the reach of the joint, up to the drive."""
     with SimulatedGraph(
-        rig=rig_of_reach(0.6), overrides={'controller': {'active': False}}
+        rig=rig_of(reach=0.6), overrides={'controller': {'active': False}}
     ) as graph:
         compensator, gear = graph.nodes['compensator'], shipped_rig().joints.gear
         graph.enable()

@@ -5,10 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from endoscope_core.control import Feedforward, FeedforwardLaw, FeedforwardSettings
+from endoscope_core.control import Feedforward, FeedforwardLaw, FeedforwardSettings, MotorLimits
 from endoscope_core.hysteresis import BoucWenParameters, direct_inverse
+from endoscope_core.rig import shipped_rig
 
 TICK = 1e-3
+LIMITS = MotorLimits.of(shipped_rig())
+SETTINGS = FeedforwardSettings(LIMITS)
 SMALL = BoucWenParameters.from_shape(alpha=0.9, lag=0.3, travel=0.02, rho=-0.9, n=2.0)
 LARGE = BoucWenParameters.from_shape(alpha=0.95, lag=0.8, travel=0.04, rho=-0.9, n=3.0)
 NONE = FeedforwardLaw()
@@ -37,13 +40,15 @@ def run(feedforward, start, end):
 
 
 def test_without_a_model_the_desired_angle_passes():
-    commands = run(Feedforward(2), 0.0, 0.5)
+    commands = run(Feedforward(2, SETTINGS), 0.0, 0.5)
     expected = [desired_at(t) for t in np.arange(0.0, 0.5, TICK)]
     np.testing.assert_allclose(commands, expected, atol=1e-12)
 
 
 def test_without_lead_it_is_equation_5():
-    feedforward = Feedforward(1, FeedforwardSettings(lead=0.0, speed_limit=1e3, dead_band=0.0))
+    feedforward = Feedforward(
+        1, FeedforwardSettings(LIMITS, lead=0.0, speed_limit=1e3, dead_band=0.0)
+    )
     feedforward.select(FeedforwardLaw('bouc_wen', (LARGE,)))
     theta = np.sin(np.arange(0.0, 7.0, TICK))
     commands = [feedforward.step([x], [0.0], TICK)[0] for x in theta]
@@ -52,19 +57,18 @@ def test_without_lead_it_is_equation_5():
 
 @given(laws, laws, st.floats(0.2, 1.2))
 def test_a_switch_while_moving_leaves_no_jump(before, after, when):
-    settings_ = FeedforwardSettings()
-    feedforward = Feedforward(2, settings_)
+    feedforward = Feedforward(2, SETTINGS)
     feedforward.select(before)
     last = run(feedforward, 0.0, when)[-1]
     feedforward.select(after)
     next_ = feedforward.step(desired_at(when), velocity_at(when), TICK)
     slope = max(p.inverse_slope for p in (SMALL, LARGE))
     own_motion = slope * 1.2 * TICK
-    assert np.all(np.abs(next_ - last) <= own_motion + settings_.offset_rate * TICK)
+    assert np.all(np.abs(next_ - last) <= own_motion + SETTINGS.offset_rate * TICK)
 
 
 def test_the_offset_of_a_switch_is_worked_off():
-    switched, straight = Feedforward(2), Feedforward(2)
+    switched, straight = Feedforward(2, SETTINGS), Feedforward(2, SETTINGS)
     law = FeedforwardLaw('bouc_wen', (SMALL, LARGE))
     straight.select(law)
     run(switched, 0.0, 1.0)
@@ -75,7 +79,7 @@ def test_the_offset_of_a_switch_is_worked_off():
 
 
 def test_at_rest_a_switch_moves_nothing():
-    feedforward = Feedforward(2)
+    feedforward = Feedforward(2, SETTINGS)
     feedforward.select(FeedforwardLaw('bouc_wen', (SMALL, LARGE)))
     run(feedforward, 0.0, 1.0)
     rest = desired_at(1.0), (0.0, 0.0), TICK
@@ -91,7 +95,7 @@ def test_at_rest_a_switch_moves_nothing():
 
 
 def test_it_goes_on_from_a_command_that_someone_else_sent():
-    feedforward = Feedforward(2)
+    feedforward = Feedforward(2, SETTINGS)
     feedforward.select(FeedforwardLaw('bouc_wen', (SMALL, LARGE)))
     feedforward.rebase([0.4, -0.2])
     first = feedforward.step([0.0, 0.0], [0.0, 0.0], TICK)
@@ -105,7 +109,7 @@ def test_it_goes_on_from_a_command_that_someone_else_sent():
 
 @given(st.lists(st.tuples(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5)), min_size=2, max_size=40))
 def test_command_and_its_speed_are_bounded_whatever_is_desired(desired):
-    feedforward = Feedforward(2)
+    feedforward = Feedforward(2, SETTINGS)
     feedforward.select(FeedforwardLaw('bouc_wen', (SMALL, LARGE)))
     commands = np.array([feedforward.step(angle, [0.0, 0.0], TICK) for angle in desired])
     assert np.all(np.abs(commands) <= (1.5 + 0.8) / 0.9)
@@ -124,7 +128,7 @@ def test_command_and_its_speed_are_bounded_whatever_is_desired(desired):
     ],
 )
 def test_bad_input_is_refused_and_changes_nothing(inputs):
-    feedforward = Feedforward(2)
+    feedforward = Feedforward(2, SETTINGS)
     feedforward.select(FeedforwardLaw('bouc_wen', (SMALL, LARGE)))
     run(feedforward, 0.0, 0.2)
     before = feedforward.command
@@ -138,7 +142,7 @@ def test_laws_that_would_guess_are_refused():
         FeedforwardLaw('bouc_when', (SMALL,))
     with pytest.raises(ValueError, match='calibrate first'):
         FeedforwardLaw('bouc_wen')
-    feedforward = Feedforward(2)
+    feedforward = Feedforward(2, SETTINGS)
     with pytest.raises(ValueError, match='2 wanted'):
         feedforward.select(FeedforwardLaw('bouc_wen', (SMALL,)))
     assert feedforward.law == NONE
@@ -147,4 +151,4 @@ def test_laws_that_would_guess_are_refused():
 @pytest.mark.parametrize('changes', [{'lead': -1.0}, {'offset_rate': 0.0}, {'speed_limit': -1.0}])
 def test_settings_out_of_range_are_refused(changes):
     with pytest.raises(ValueError, match=next(iter(changes))):
-        FeedforwardSettings(**changes)
+        FeedforwardSettings(LIMITS, **changes)

@@ -8,12 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from play_loop import play
 
-from endoscope_core.control import MotorLimits, bending_range, shipped_limits
+from endoscope_core.control import MotorLimits, bending_range
 from endoscope_core.control.internal_model import InternalModel, TurningPoints
 from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_core.physics.simulator import simulate
+from endoscope_core.rig import shipped_rig
 
-LIMITS = shipped_limits()
+LIMITS = MotorLimits.of(shipped_rig())
 
 
 @given(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=40), st.floats(0.01, 0.9))
@@ -64,16 +65,16 @@ def test_the_reach_is_what_a_slow_swing_of_the_motor_reaches(exponent):
     swing = LIMITS.travel * np.sin(0.2 * time)
     run = simulate(PlantDescription(joints={'bend_x': joint}), swing[:, None], 5e-3)
     steady = run.bending_true[time > 40.0]
-    found = bending_range(joint)
+    found = bending_range(joint, LIMITS)
     assert found.low == pytest.approx(np.min(steady), abs=1e-3)
     assert found.high == pytest.approx(np.max(steady), abs=1e-3)
 
 
 def test_a_tighter_tube_or_a_weaker_wire_reaches_less():
     joint = JointParameters()
-    whole = bending_range(joint)
+    whole = bending_range(joint, LIMITS)
     weak = bending_range(joint, MotorLimits(gear=0.5, travel=1.5, speed=4.8, tension=12.0))
-    tight = bending_range(replace(joint, capstan_exponent=1.4))
+    tight = bending_range(replace(joint, capstan_exponent=1.4), LIMITS)
     assert 0.0 < weak.high < 0.8 * whole.high
     assert 0.0 < tight.high < 0.8 * whole.high
     assert whole.low == pytest.approx(-whole.high, abs=1e-3)

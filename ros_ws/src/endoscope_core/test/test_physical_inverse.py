@@ -10,17 +10,18 @@ from hypothesis import strategies as st
 from endoscope_core.control import (
     Feedforward,
     FeedforwardLaw,
+    FeedforwardSettings,
     MotorLimits,
     PhysicalInverse,
     PhysicalParameters,
     bending_range,
-    shipped_limits,
 )
 from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_core.physics.simulator import TICK, simulate
+from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import non_periodic_signal, periodic_signal
 
-LIMITS = shipped_limits()
+LIMITS = MotorLimits.of(shipped_rig())
 JOINT = JointParameters()
 PARAMETERS = PhysicalParameters(JOINT)
 PERIODIC, NON_PERIODIC = periodic_signal(3.2 * np.pi), non_periodic_signal(12.0)
@@ -46,14 +47,16 @@ def simulated(joint, command):
 @pytest.mark.parametrize('exponent', [0.5, 0.9, 1.4])
 def test_a_plant_that_is_known_is_followed(exponent, signal):
     joint = replace(JOINT, capstan_exponent=exponent)
-    reached = bending_range(joint)
+    reached = bending_range(joint, LIMITS)
     most = np.max(np.abs(signal(np.arange(0.0, signal.duration, 0.01))[0]))
     signal = signal.scaled(min(1.0, 0.8 * min(-reached.low, reached.high) / most))
     time = np.arange(0.0, signal.steady[1], TICK)
     angle, velocity = signal(time)
     steady = time >= signal.steady[0]
     error = (
-        simulated(joint, commands(PhysicalInverse(PhysicalParameters(joint)), angle, velocity))[0]
+        simulated(
+            joint, commands(PhysicalInverse(PhysicalParameters(joint), LIMITS), angle, velocity)
+        )[0]
         - angle
     )
     uncompensated = simulated(joint, angle)[0] - angle
@@ -65,14 +68,14 @@ def test_motion_that_slows_down_but_does_not_turn_crosses_nothing():
     time = np.arange(0.0, 2.9, TICK)
     speed = 0.35 + 0.3 * np.cos(2.0 * np.pi * time / 1.5)
     angle = np.cumsum(speed) * TICK - 0.5
-    inverse = PhysicalInverse(PARAMETERS)
+    inverse = PhysicalInverse(PARAMETERS, LIMITS)
     inverse.begin(1.0, -0.5, speed[0])
     command = np.array([inverse.wanted(a, v, TICK) for a, v in zip(angle, speed, strict=True)])
     assert np.min(np.diff(command)) > -1e-6
 
 
 def test_a_desired_angle_that_trembles_does_not_turn_the_motor():
-    inverse = PhysicalInverse(PARAMETERS)
+    inverse = PhysicalInverse(PARAMETERS, LIMITS)
     inverse.begin(1.0, 0.3, 0.0)
     generator = np.random.default_rng(3)
     trembling = 0.3 + 0.5 * 0.003 * generator.uniform(-1.0, 1.0, 2000)
@@ -102,7 +105,7 @@ def test_a_tube_that_does_not_reach_so_far_is_pulled_no_further_than_allowed():
 @given(st.lists(st.tuples(st.floats(-1.7, 1.7), st.floats(-20.0, 20.0)), min_size=1, max_size=60))
 @settings(max_examples=30)
 def test_whatever_is_desired_the_command_is_finite_and_its_speed_and_travel_are_bounded(desired):
-    feedforward = Feedforward(1)
+    feedforward = Feedforward(1, FeedforwardSettings(LIMITS))
     feedforward.select(FeedforwardLaw('physical', (PARAMETERS,)))
     last = None
     for angle, velocity in desired:
@@ -114,7 +117,7 @@ def test_whatever_is_desired_the_command_is_finite_and_its_speed_and_travel_are_
 
 
 def test_modes_change_while_it_moves_without_a_jump():
-    feedforward = Feedforward(1)
+    feedforward = Feedforward(1, FeedforwardSettings(LIMITS))
     physical = FeedforwardLaw('physical', (PARAMETERS,))
     learning = FeedforwardLaw('adaptive_physical', (PARAMETERS,))
     given_out = []

@@ -10,16 +10,18 @@ from endoscope_core.control import (
     DesiredMotion,
     Feedforward,
     FeedforwardLaw,
+    FeedforwardSettings,
+    MotorLimits,
     PhysicalParameters,
     PlantLearning,
-    shipped_limits,
 )
 from endoscope_core.control.internal_model import InternalModel
 from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_core.physics.sensing import SensorModel
 from endoscope_core.physics.simulator import TICK, PlantSimulator
+from endoscope_core.rig import shipped_rig
 
-LIMITS = shipped_limits()
+LIMITS = MotorLimits.of(shipped_rig())
 JOINT = JointParameters()
 
 
@@ -49,7 +51,7 @@ def test_the_predictor_is_the_plant_behind_its_servo():
 
 
 def test_measurements_at_rest_and_the_first_after_a_silence_move_nothing():
-    feedforward = Feedforward(1)
+    feedforward = Feedforward(1, FeedforwardSettings(LIMITS))
     loose = PhysicalParameters(replace(JOINT, capstan_exponent=0.5))
     feedforward.select(FeedforwardLaw('adaptive_physical', (loose,)))
     model = InternalModel(JOINT, LIMITS)
@@ -77,7 +79,7 @@ def test_measurements_at_rest_and_the_first_after_a_silence_move_nothing():
 def test_a_reading_that_is_late_teaches_what_it_says_of_its_own_time():
     plant = PlantDescription(joints={'bend_x': JOINT})
     rig, sensors = PlantSimulator(plant), SensorModel(plant.sensors, 2)
-    motion, feedforward = DesiredMotion(1), Feedforward(1)
+    motion, feedforward = DesiredMotion(1), Feedforward(1, FeedforwardSettings(LIMITS))
     feedforward.select(FeedforwardLaw('adaptive_physical', (PhysicalParameters(JOINT),)))
     tips = []
     for k in range(9000):

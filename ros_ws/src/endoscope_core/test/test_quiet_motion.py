@@ -11,18 +11,21 @@ from endoscope_core.control import (
     AdaptiveBacklashController,
     DesiredMotion,
     Feedforward,
+    FeedforwardSettings,
     Handle,
+    MotorLimits,
     PhysicalParameters,
     TrackerMeasurement,
-    shipped_limits,
 )
 from endoscope_core.control.limits import COUNT
 from endoscope_core.identification.law_choice import CalibrationFindings, LawChoice
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.sensing import SensorModel
 from endoscope_core.physics.simulator import PlantSimulator
+from endoscope_core.rig import shipped_rig
 
 TICK = 1e-3
+LIMITS = MotorLimits.of(shipped_rig())
 RATES = (50, 250, 1000)
 FEEDBACK = {
     'alone': None,
@@ -77,7 +80,10 @@ def tip_and_shafts(wanted, mode, feedback):
     """Tip angles (N, 2) and shaft commands (N, 2) of the nominal rig with a tracker of 40 Hz."""
     plant = PlantDescription()
     rig, sensors = PlantSimulator(plant, TICK), SensorModel(plant.sensors, 1)
-    motion, feedforward = DesiredMotion(2), Feedforward(2)
+    motion, feedforward = (
+        DesiredMotion(2),
+        Feedforward(2, FeedforwardSettings(LIMITS)),
+    )
     plants = tuple(map(PhysicalParameters, plant.joints.values()))
     by = 'plant' if 'physical' in mode else 'class'
     findings = CalibrationFindings(class_deg=70, plants=plants)
@@ -97,7 +103,7 @@ def tip_and_shafts(wanted, mode, feedback):
         if controller:
             drive = drive + controller.step(k * TICK, angle, speed, measurement)
         tips.append(sample.bending_true.copy())
-        shafts.append(shipped_limits().gear * drive)
+        shafts.append(shipped_rig().joints.gear * drive)
         rig.advance(shafts[-1])
     return np.array(tips), np.array(shafts)
 

@@ -81,7 +81,7 @@ def _classes(args: argparse.Namespace) -> int:
     from endoscope_lab.identification.classes import class_parameter_sets, identify_classes
 
     dataset = load_dataset(args.source)
-    lead = FeedforwardSettings().lead
+    lead = FeedforwardSettings.lead
     found = identify_classes(dataset, lead, args.seed, args.per_class, _report, args.model)
     command = (
         f'endoscope dataset --seed {dataset.manifest["seed"]} --n {len(dataset.class_deg)} '

@@ -15,19 +15,22 @@ from endoscope_core.control import (
     DesiredMotion,
     Feedforward,
     FeedforwardLaw,
+    FeedforwardSettings,
+    MotorLimits,
     bending_range,
-    shipped_limits,
 )
 from endoscope_core.identification.law_choice import CalibrationFindings, LawChoice
 from endoscope_core.identification.plant_fit import plants_of_calibration
 from endoscope_core.metrics import tracking_rmse
 from endoscope_core.physics import JointParameters, PlantDescription, SensorModel, simulate
+from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import calibration_motion, periodic_signal
 from endoscope_lab.concealed import sliding_nodes
 from endoscope_lab.dataset import configuration_of_size, random_instrument
 from endoscope_lab.dataset.rig_variation import calibration_command
 
 TICK, NODES, SPREAD = 1e-3, 12, 0.7
+LIMITS = MotorLimits.of(shipped_rig())
 
 
 @pytest.mark.parametrize(
@@ -68,13 +71,16 @@ def answer(joint, shaft):
 
 def commanded(law, angle, velocity):
     """Shaft commands (N,) of a feed-forward law for a desired angle."""
-    motion, feedforward = DesiredMotion(2), Feedforward(2)
+    motion, feedforward = (
+        DesiredMotion(2),
+        Feedforward(2, FeedforwardSettings(LIMITS)),
+    )
     feedforward.select(law)
     commands = []
     for a, v in zip(angle.tolist(), velocity.tolist(), strict=True):
         desired, rate = motion.follow([a, a], [v, v], TICK)
         commands.append(feedforward.step(desired, rate, TICK)[0])
-    return shipped_limits().gear * np.array(commands)
+    return shipped_rig().joints.gear * np.array(commands)
 
 
 def rmse_of_methods(seed, size_deg):
@@ -89,10 +95,10 @@ def rmse_of_methods(seed, size_deg):
     read = SensorModel(tube.plant.sensors, seed).tension(np.hstack([tension, tension]))
     verdict = load_classifier().classify(read)
     asked, _ = motion.signal(TICK * np.arange(len(read)))
-    plants = plants_of_calibration(asked, read, shipped_limits().gear)
+    plants = plants_of_calibration(asked, read, shipped_rig().joints.gear)
     findings = CalibrationFindings(verdict.class_deg, verdict.expected_size, plants)
 
-    reached = bending_range(joint)
+    reached = bending_range(joint, LIMITS)
     signal = periodic_signal()
     most = 0.8 * min(-reached.low, reached.high) / np.deg2rad(60.0)
     signal = signal.scaled(min(1.0, most))

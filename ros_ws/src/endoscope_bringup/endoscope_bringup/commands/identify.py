@@ -71,7 +71,7 @@ def _of_bag(args: argparse.Namespace) -> dict[str, object]:
 
     if args.model == PHYSICAL:
         return _plant_of_bag(args)
-    lead = FeedforwardSettings().lead
+    lead = FeedforwardSettings.lead
     joints: dict[str, object] = {}
     for joint, recording in hysteresis_of_bag(*_bag_and_gear(args)).items():
         model = fit_model([recording], args.seed, args.model)

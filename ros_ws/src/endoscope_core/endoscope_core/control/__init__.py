@@ -15,7 +15,7 @@ from endoscope_core.control.desired_motion import DesiredMotion
 from endoscope_core.control.feedforward import Feedforward, FeedforwardLaw, FeedforwardSettings
 from endoscope_core.control.handle import Handle, HandleRefusal, HandleSettings
 from endoscope_core.control.internal_model import PhysicalParameters, bending_range
-from endoscope_core.control.limits import MotorLimits, shipped_limits
+from endoscope_core.control.limits import MotorLimits
 from endoscope_core.control.physical_inverse import AdaptivePhysicalInverse, PhysicalInverse
 from endoscope_core.control.plant_learning import PlantLearning, PlantLearningSettings
 from endoscope_core.control.tracker_feedback import TrackerFeedback, TrackerMeasurement
@@ -46,5 +46,4 @@ __all__ = [
     'adopted_plant',
     'bending_range',
     'plant_hash',
-    'shipped_limits',
 ]

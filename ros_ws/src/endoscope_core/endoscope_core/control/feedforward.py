@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -17,7 +17,6 @@ from endoscope_core.control.limits import (
     MotorLimits,
     Play,
     limited,
-    shipped_limits,
     worked_off,
 )
 from endoscope_core.control.physical_inverse import AdaptivePhysicalInverse, PhysicalInverse
@@ -150,6 +149,7 @@ class FeedforwardLaw:
 class FeedforwardSettings:
     """How the feed-forward moves in time; angles in rad, times in s."""
 
+    limits: MotorLimits  # that the physical modes keep to
     # s by which the desired angle is foreseen, ``theta_d + lead theta_d'``: the servo's own lag,
     # so that the motor has crossed the dead zone when the joint is to turn back. 0 gives equation
     # 5 as printed. The physical modes know their servo and take no notice.
@@ -165,7 +165,6 @@ class FeedforwardSettings:
     resting_travel: float = math.radians(1.0)
     # rad by which the foreseen angle may turn back without any effect: two counts of an encoder.
     dead_band: float = 2.0 * COUNT
-    limits: MotorLimits = field(default_factory=shipped_limits)  # that the physical modes keep to
 
     def __post_init__(self) -> None:
         if not (0.0 <= self.lead <= 0.5):
@@ -199,8 +198,8 @@ class Feedforward:
     in every mode.
     """
 
-    def __init__(self, joints: int, settings: FeedforwardSettings | None = None) -> None:
-        self.settings = settings or FeedforwardSettings()
+    def __init__(self, joints: int, settings: FeedforwardSettings) -> None:
+        self.settings = settings
         self.law = FeedforwardLaw()
         self._count = joints
         self._joints: list[_Joint] = []

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.compiled import Flags, compiled
-from endoscope_core.control.limits import MotorLimits, shipped_limits
+from endoscope_core.control.limits import MotorLimits
 from endoscope_core.physics.description import (
     EffectSpec,
     JointParameters,
@@ -360,15 +360,12 @@ class InternalModel:
         return path.tolist()
 
 
-def bending_range(
-    joint: JointParameters, limits: MotorLimits | None = None, added: Added = ()
-) -> BendingRange:
+def bending_range(joint: JointParameters, limits: MotorLimits, added: Added = ()) -> BendingRange:
     """Find how far a joint can be bent to and fro, in rad, time and again.
 
-    The motor swings slowly as far as its travel and the wires' tension allow, by default those of
-    the shipped rig.
+    The motor swings slowly as far as its travel and the wires' tension allow.
     """
-    model = InternalModel(joint, limits or shipped_limits(), added)
+    model = InternalModel(joint, limits, added)
     there_and_back = [_BEYOND, -_BEYOND] * 2
     # A first pull from rest gets elsewhere than later ones, which begin in wires left tense.
     model.go_through(there_and_back)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache
 
-from endoscope_core.rig import Rig, shipped_rig
+from endoscope_core.rig import Rig
 
 COUNT = 2.0 * math.pi / 4096.0
 """Angle in rad between two neighbouring counts of a 12-bit encoder, as handles have it."""
@@ -45,12 +44,6 @@ class MotorLimits:
             speed=rig.motors.speed,
             tension=rig.tension.calibration_ceiling,
         )
-
-
-@cache
-def shipped_limits() -> MotorLimits:
-    """Those of the rig that is shipped."""
-    return MotorLimits.of(shipped_rig())
 
 
 class Play:

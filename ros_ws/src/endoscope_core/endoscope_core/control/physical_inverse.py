@@ -9,7 +9,7 @@ from endoscope_core.control.internal_model import (
     PhysicalParameters,
     TurningPoints,
 )
-from endoscope_core.control.limits import COUNT, MotorLimits, shipped_limits
+from endoscope_core.control.limits import COUNT, MotorLimits
 from endoscope_core.control.plant_learning import PlantLearning, PlantLearningSettings
 
 SWING = 1.0
@@ -20,18 +20,17 @@ class PhysicalInverse:
     """Turns the shaft of an internal model so that its joint moves as desired, and says how.
 
     The model follows what is wanted, not what went out: an offset that someone adds to the command
-    must not be taken back as an error of the joint. `limits` are by default those of the shipped
-    rig, `dead_band` is in rad.
+    must not be taken back as an error of the joint. `dead_band` is in rad.
     """
 
     def __init__(
         self,
         parameters: PhysicalParameters,
-        limits: MotorLimits | None = None,
+        limits: MotorLimits,
         dead_band: float = 2.0 * COUNT,
     ) -> None:
         self.parameters = parameters
-        self.limits = limits or shipped_limits()
+        self.limits = limits
         self._dead_band = dead_band
         self.servo_lag = parameters.servo_lag
         self.other = 0.0  # where the other joint is to be, rad: the two may be coupled
@@ -109,7 +108,7 @@ class AdaptivePhysicalInverse(PhysicalInverse):
     def __init__(
         self,
         parameters: PhysicalParameters,
-        limits: MotorLimits | None = None,
+        limits: MotorLimits,
         dead_band: float = 2.0 * COUNT,
         learning: PlantLearningSettings | None = None,
     ) -> None:

@@ -31,7 +31,7 @@ from endoscope_lab.papers.real_recordings import (
     real_recordings,
 )
 from endoscope_lab.papers.row import PapersBench, Row
-from endoscope_lab.papers.tracking_trial import never_seen_tube
+from endoscope_lab.papers.tracking_trial import LIMITS, never_seen_tube
 
 if TYPE_CHECKING:
     from endoscope_lab.papers.networks import CrossValidation
@@ -202,7 +202,7 @@ def reach_rows(settings: PapersBench) -> list[Row]:
             recording.desired_angle, recording.tension, shipped_rig().joints.gear
         )
         for joint, told in zip(plant.joints.values(), found, strict=True):
-            true, guess = bending_range(joint), bending_range(told.joint)
+            true, guess = (bending_range(each, LIMITS) for each in (joint, told.joint))
             errors.append(100.0 * abs((guess.high - guess.low) / (true.high - true.low) - 1.0))
         settings.report(f'reach: tube {number + 1} of {_TUBES}')
     return [

@@ -15,10 +15,11 @@ from endoscope_core.control import (
     DesiredMotion,
     Feedforward,
     FeedforwardLaw,
+    FeedforwardSettings,
+    MotorLimits,
     TrackerMeasurement,
     bending_range,
 )
-from endoscope_core.control.limits import shipped_limits
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.identification.plant_fit import plants_of_calibration
 from endoscope_core.metrics import tracking_rmse, width_at_mid_height
@@ -35,6 +36,7 @@ from endoscope_lab.dataset import (
 from endoscope_lab.dataset.rig_variation import GREATEST_UNEVENNESS
 
 TICK = 1.0e-3
+LIMITS = MotorLimits.of(shipped_rig())
 
 
 @dataclass(frozen=True)
@@ -65,8 +67,11 @@ def run_tracking_trial(
     """Drive every joint of a rig along a signal; feedback is by the tracker's noisy readings."""
     rig, sensors = PlantSimulator(plant, TICK), SensorModel(plant.sensors, seed)
     joints = len(rig.joints)
-    gear = shipped_limits().gear
-    motion, feedforward = DesiredMotion(joints), Feedforward(joints)
+    gear = shipped_rig().joints.gear
+    motion, feedforward = (
+        DesiredMotion(joints),
+        Feedforward(joints, FeedforwardSettings(LIMITS)),
+    )
     feedforward.select(law)
     # In mode 'adaptive_physical' the law learns from them, otherwise the controller.
     learns = law.mode == ADAPTIVE_PHYSICAL
@@ -147,7 +152,7 @@ def calibrate(tube: NeverSeenTube, classifier: Classifier) -> CalibrationFinding
 
 def within_reach(signal: Signal, plant: PlantDescription) -> Signal:
     """A signal, scaled to 80 % of what every joint of a plant reaches where that is less."""
-    return within_ranges(signal, list(map(bending_range, plant.joints.values())))
+    return within_ranges(signal, [bending_range(joint, LIMITS) for joint in plant.joints.values()])
 
 
 def within_ranges(signal: Signal, ranges: Sequence[BendingRange]) -> Signal:

@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 
 from endoscope_core.calibration import words_of
-from endoscope_core.control import PhysicalParameters, bending_range
+from endoscope_core.control import MotorLimits, PhysicalParameters, bending_range
 from endoscope_core.control.internal_model import PROFILE
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.safety import BendingRange
@@ -34,12 +34,14 @@ def successful_result(
     verdict: 'ClassificationResult',
     backlash: float | None,
     duration: float,
+    limits: MotorLimits,
     plants: Sequence[PhysicalParameters] = (),
     zeros: 'NDArray[np.float64] | None' = None,
 ) -> DiagnosticArray:
     """Say which class was found; `backlash`, in rad, is None where the tracker could not measure.
 
-    `duration`, of the whole calibration, is in s; `zeros` is what the zero of each load cell is off
+    `duration`, of the whole calibration, is in s; how far the plants can be bent follows from the
+    rig's `limits`; `zeros` is what the zero of each load cell is off
     by, in N.
     """
     values: dict[str, object] = {'class_deg': verdict.class_deg, 'probability': verdict.probability}
@@ -61,7 +63,7 @@ def successful_result(
     if plants:
         values |= plant_values(plants)
         for joint, plant in zip(JOINTS, plants, strict=True):
-            tube = bending_range(plant.joint)
+            tube = bending_range(plant.joint, limits)
             values |= {f'{REACH}{joint}.low': tube.low, f'{REACH}{joint}.high': tube.high}
     message = f'class {verdict.class_deg} deg with probability {verdict.probability:.3f}'
     return _message(stamp_ns, OK, with_zeros(message, zeros), values)

@@ -25,7 +25,7 @@ from endoscope_core.classifier.classification import (
     UnseenTensionError,
 )
 from endoscope_core.classifier.weights_file import load_classifier
-from endoscope_core.control import PhysicalParameters
+from endoscope_core.control import MotorLimits, PhysicalParameters
 from endoscope_core.identification.plant_fit import PlantFitError, plants_of_calibration
 from endoscope_core.safety import StateCommand, TensionGuard
 from endoscope_core.safety.guards import TOLD_RAD
@@ -311,7 +311,11 @@ class CalibrationNode(EndoscopeNode):
             backlash = self._bending.backlash_size(run.record.start_ns)
         now = self.ticker.now_ns()
         duration = (now - self._began_ns) * 1e-9
-        self._publish(successful_result(now, verdict, backlash, duration, plants, self._zeros))
+        self._publish(
+            successful_result(
+                now, verdict, backlash, duration, MotorLimits.of(self.rig), plants, self._zeros
+            )
+        )
         self._run = None
         self._runs += 1
         self._tell(with_zeros(f'class {verdict.class_deg} deg', self._zeros))

@@ -87,15 +87,11 @@ class CompensatorNode(EndoscopeNode):
         )
         limits = (facts.drive * facts.gear, motors.speed, motors.acceleration, motors.step)
         self.shaper = MotionShaper(MotionLimits.either_way(len(names.MOTORS), *limits))
-        self._feedforward = Feedforward(
-            len(names.JOINTS),
-            FeedforwardSettings(
-                lead=p.lead,
-                speed_limit=motors.speed / facts.gear,
-                limits=MotorLimits.of(self.rig),
-            ),
+        settings = FeedforwardSettings(
+            MotorLimits.of(self.rig), lead=p.lead, speed_limit=motors.speed / facts.gear
         )
-        self._passing = Feedforward(len(names.JOINTS))
+        self._feedforward = Feedforward(len(names.JOINTS), settings)
+        self._passing = Feedforward(len(names.JOINTS), settings)
         self._desired = DesiredMotion(len(names.JOINTS))
         self._choice = LawChoice(len(names.JOINTS), p.parameter_sets, p.table)
         self._compiled: set[str] = set()
@@ -226,7 +222,7 @@ class CompensatorNode(EndoscopeNode):
         """Compile a mode before a command needs it, once."""
         if law.mode in self._compiled:
             return
-        trial = Feedforward(len(names.JOINTS))
+        trial = Feedforward(len(names.JOINTS), self._feedforward.settings)
         trial.select(law)
         trial.step(_NOTHING, _NOTHING, 1e-3)
         trial.measure(0.0, _NOTHING)
