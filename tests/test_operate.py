@@ -312,7 +312,7 @@ def test_what_a_topic_says_is_a_line_of_json_a_message(graph):
     graph.probe.destroy_publisher(publisher)
     [line] = out.splitlines()
     assert line.isprintable()
-    assert json.loads(line)['data'].startswith('\x1b]0;title')
+    assert json.loads(line) == {'data': '\x1b]0;title\x07\u202egone\nforged: line'}
 
 
 def test_a_topic_that_nobody_sends_is_named_with_the_nearest(graph):

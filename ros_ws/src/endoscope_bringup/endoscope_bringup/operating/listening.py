@@ -125,12 +125,17 @@ def echo(
         fresh, waiting[:] = waiting[:], []
         for data in fresh[: int(min(left, len(fresh)))]:
             message: Any = typestore().deserialize_cdr(data, kind)
-            print_json_line(asdict(message))
+            print_json_line(asdict(message, dict_factory=_fields))
         left -= len(fresh)
         if time.monotonic() > end:
             return
         client.serve(_PROMPT_S)
         client.hear()
+
+
+def _fields(items: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Those of a message, without the name of its type that `rosbags` puts beside them."""
+    return {name: value for name, value in items if name != '__msgtype__'}
 
 
 def _hint(client: GraphClient, name: str) -> str:
