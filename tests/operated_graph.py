@@ -54,7 +54,7 @@ class OperatedGraph(SimulatedGraph):
         overrides = {'recorder': {'bag': str(folder / 'bag'), 'autostart': False}}
         overrides |= {
             'calibration': {'motion': 'brief'},
-            'conductor': {'wait_for': ['motor/measured_js']},
+            'simulation_clock': {'wait_for': ['motor/measured_js']},
         }
         super().__init__(
             extra=(*extra, RecorderNode), overrides=overrides | values, tick_rate=tick_rate

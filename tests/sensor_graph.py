@@ -141,7 +141,7 @@ class SensorGraph(ProbedGraph):
 
     def play(self) -> None:
         """Let the master move both joints."""
-        self.set('console', source='motion', motion='periodic')
+        self.set('master', source='motion', motion='periodic')
 
     def call(self, node: str, service: str) -> Trigger.Response:
         client = self.probe.create_client(Trigger, f'{node}/{service}')

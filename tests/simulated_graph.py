@@ -54,7 +54,7 @@ class SimulatedGraph(ProbedGraph):
         self.domain = private_domain()
         overrides = overrides or {}
         # A busy machine may keep the nodes from answering a tick for long.
-        clock = {'timeout': PATIENCE_S} | overrides.get('conductor', {})
+        clock = {'timeout': PATIENCE_S} | overrides.get('simulation_clock', {})
         runtime = Runtime(
             args=[
                 *('--ros-args', '--log-level', 'fatal'),
@@ -63,7 +63,7 @@ class SimulatedGraph(ProbedGraph):
             ],
             context=Context(),
             domain_id=self.domain,
-            overrides=overrides | {'conductor': clock},
+            overrides=overrides | {'simulation_clock': clock},
             rig=rig,
         )
         for factory in (*SLAVE_NODES, *CONTROL_NODES, *extra, SimulationClockNode):
@@ -71,7 +71,7 @@ class SimulatedGraph(ProbedGraph):
                 runtime.add(factory)
         runtime.check_parameters()
         super().__init__(runtime, PATIENCE_S)
-        self.clock = self.nodes['conductor']
+        self.clock = self.nodes['simulation_clock']
         self.results = []
         self.probe.create_subscription(
             DiagnosticArray, CALIBRATION_RESULT, self.results.append, RESULT

@@ -40,12 +40,12 @@ def refused(graph, *words):
 def error_of_a_motion(graph):
     """Rms error in rad of the tip over a motion that is played from its beginning."""
     tips = graph.tips
-    graph.set('console', source='motion', motion='non_periodic')
+    graph.set('master', source='motion', motion='non_periodic')
     graph.advance(3.0)
     tips.clear()
     graph.wanted.clear()
     graph.advance(6.0)
-    graph.set('console', source='none')
+    graph.set('master', source='none')
     graph.advance(0.6)
     at = [w.stamp_ns for w in graph.wanted]
     wanted = np.array([w.position for w in graph.wanted])
@@ -71,10 +71,10 @@ def test_the_true_plant_is_adopted_and_undone(plants):
         assert graph.goals[-1].position == sent
         after = error_of_a_motion(graph)
         assert after < 0.5 * before
-        graph.set('console', source='motion', motion='non_periodic')
+        graph.set('master', source='motion', motion='non_periodic')
         graph.advance(2.0)
         assert refused(graph, '--undo') == 'moving'
-        graph.set('console', source='none')
+        graph.set('master', source='none')
         graph.advance(0.6)
         status, out, errors = graph.run('operate', 'adopt', '--undo', '--json')
         assert status == 0, out + errors
@@ -106,9 +106,9 @@ def test_strangers_narrow_plants_and_faults_are_refused(plants, monkeypatch):
     with OperatedGraph(plants) as graph:
         graph.probe.create_subscription(DiagnosticArray, COMPENSATOR_PLANT, told.append, RESULT)
         graph.enable()
-        graph.set('console', source='motion', motion='non_periodic')
+        graph.set('master', source='motion', motion='non_periodic')
         graph.advance(2.0)
-        graph.set('console', source='none')
+        graph.set('master', source='none')
         graph.advance(0.6)
         assert refused(graph, plants / 'stiff.yaml') == 'beyond_range'
         graph.advance(0.2)

@@ -73,7 +73,7 @@ class ForeignParticipant:
 def graph(tmp_path_factory):
     with OperatedGraph(tmp_path_factory.mktemp('operated'), extra=SHOWING_NODES) as graph:
         graph.said = {topic: graph.listen(topic, names) for topic, names in STREAMS.items()}
-        graph.set('console', source='master')
+        graph.set('master', source='master')
         graph.enable()
         yield graph
 

@@ -50,7 +50,7 @@ def rig(running):
     # The one before has left the handle's place. One that failed may have left a source behind.
     own = 'console_web'
     running.until(lambda: own not in running.handle_senders(), 'a free place of the handle')
-    running.set('console', source='master')
+    running.set('master', source='master')
     running.until(lambda: not running.handle_senders(), 'nobody else in it')
     if running.client.state != 'DISABLED':
         running.client.ask('disable')
@@ -107,22 +107,22 @@ def test_a_held_hand_moves_the_slave_and_its_release_stops_it(rig):
 
 
 def test_nobody_speaks_for_the_handle_but_while_somebody_operates(rig):
-    rig.set('console', source='none')
+    rig.set('master', source='none')
     try:
         with rig.page() as page:
             assert rig.handle_senders() == []
             assert page.order('claim')['ok']
-            assert rig.setting('console.source') == 'master'
+            assert rig.setting('master.source') == 'master'
             rig.until(lambda: rig.handle_senders() == ['console_web'], 'the sender')
             assert page.order('release')['ok']
             rig.until(lambda: rig.handle_senders() == [], 'the end of it')
-            rig.until(lambda: rig.setting('console.source') == 'none', 'the source')
+            rig.until(lambda: rig.setting('master.source') == 'none', 'the source')
     finally:
-        rig.set('console', source='master')
+        rig.set('master', source='master')
 
 
 def test_what_the_master_plays_is_ended_only_on_demand_and_does_not_begin_anew(rig):
-    rig.set('console', source='motion')
+    rig.set('master', source='motion')
     try:
         with rig.page() as page:
             rig.until(lambda: page.state.get('playing') is not None, 'the motion')
@@ -130,12 +130,12 @@ def test_what_the_master_plays_is_ended_only_on_demand_and_does_not_begin_anew(r
             assert not refused['ok']
             assert 'the master plays' in refused['why']
             ready(rig, page)
-            assert rig.setting('console.source') == 'master'
+            assert rig.setting('master.source') == 'master'
             page.order('release')
-            rig.until(lambda: rig.setting('console.source') == 'motion', 'the source')
+            rig.until(lambda: rig.setting('master.source') == 'motion', 'the source')
             rig.until(lambda: rig.client.state == 'PAUSED', 'PAUSED')
     finally:
-        rig.set('console', source='master')
+        rig.set('master', source='master')
 
 
 def test_another_speaker_for_the_handle_is_left_alone(rig):
@@ -293,7 +293,7 @@ def test_orders_are_said_in_the_graph_with_who_gave_them(rig):
         page.order('claim')
         page.order('set', scale=0.5)
         rig.until(lambda: page.state['console']['scale'] == 0.5)
-        assert rig.setting('console.scale') == 0.5
+        assert rig.setting('master.scale') == 0.5
         page.order('set', scale=1.0)
         assert not page.order('state', command='home')['ok']
         page.order('release')
@@ -409,9 +409,9 @@ def test_an_experiment_of_an_earlier_explanation_is_played_while_one_holds_on(ri
         while page.state['playing'] is not None:
             engage(rig, page)
             rig.passes(0.1)
-        rig.until(lambda: rig.setting('console.source') == 'master', 'the end of it')
-        assert not rig.setting('console.hold_to_play')
-        assert rig.setting('console.command_file') == ''
+        rig.until(lambda: rig.setting('master.source') == 'master', 'the end of it')
+        assert not rig.setting('master.hold_to_play')
+        assert rig.setting('master.command_file') == ''
         assert rig.wanted[-1] == pytest.approx(bending[-1], abs=0.005)
 
 

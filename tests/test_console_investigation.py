@@ -119,7 +119,7 @@ def test_stop_pauses_what_is_played_and_leaves_everything_as_it_was(running, pag
     assert it['sentence'] == 'It was interrupted: a person ended it.'
     page.does(pressed=False)
     assert rig.stands()
-    assert rig.setting('console.source') == 'master'
+    assert rig.setting('master.source') == 'master'
     assert rig.setting('compensator.mode') == 'bouc_wen'
 
 

@@ -416,9 +416,9 @@ def test_scale_and_mode_change_only_while_nothing_is_held(console, page):
     enable(page)
 
     def scale():
-        return console.ask(lambda graph: graph.nodes['console'].get_parameter('scale').value)
+        return console.ask(lambda graph: graph.nodes['master'].get_parameter('scale').value)
 
-    console.ask(lambda graph: graph.set('console', scale=1.0))
+    console.ask(lambda graph: graph.set('master', scale=1.0))
     shows(page, 'scale-value', '1')
     page.keyboard.press('BracketLeft')
     until(page, lambda: scale() == 0.7, 'a smaller scale')
@@ -437,7 +437,7 @@ def test_scale_and_mode_change_only_while_nothing_is_held(console, page):
     page.keyboard.press('KeyM')
     expect(page.locator('#mode-position')).to_have_attribute('aria-pressed', 'true')
     release()
-    console.ask(lambda graph: graph.set('console', scale=1.0))
+    console.ask(lambda graph: graph.set('master', scale=1.0))
 
 
 def test_recordings_are_made_and_offered_for_explanation(console, page):

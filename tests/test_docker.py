@@ -26,7 +26,6 @@ HARDWARE_FILE = ROOT / 'docker' / 'hardware.yaml'
 
 # All nodes in one process, the clock of simulated time, the player of bags; what services run too.
 STARTED_BY_HAND = {'graph', 'simulation_clock', 'replay', 'healthcheck'}
-STARTED_BY_HAND |= {'console', 'conductor'}  # old names
 PAGE = 'web_console'
 
 

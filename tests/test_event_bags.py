@@ -235,7 +235,7 @@ def of_the_graph(tmp_path_factory):
     overrides = {
         'recorder': {'bag': str(folder / 'bag'), 'autostart': False, 'keep': 3.0},
         # Load cells may fall silent.
-        'conductor': {'wait_for': [MOTOR_MEASURED]},
+        'simulation_clock': {'wait_for': [MOTOR_MEASURED]},
     }
     extra = (InstrumentModelNode, RecorderNode)
     with SimulatedGraph(extra=extra, overrides=overrides) as graph:
@@ -262,7 +262,7 @@ def test_a_fault_of_the_graph_tells_its_cause(of_the_graph, capsys):
 def test_a_fault_that_is_left_at_once_tells_its_cause_too(tmp_path):
     overrides = {
         'recorder': {'bag': str(tmp_path / 'bag'), 'autostart': False},
-        'conductor': {'wait_for': [MOTOR_MEASURED]},
+        'simulation_clock': {'wait_for': [MOTOR_MEASURED]},
     }
     with SimulatedGraph(extra=(RecorderNode,), overrides=overrides) as graph:
         graph.enable()

@@ -55,7 +55,7 @@ def test_finds_the_class_of_a_known_tube_from_anywhere(tmp_path, size_deg, seed,
         assert math.degrees(float(values['regressed_size'])) == pytest.approx(size_deg, abs=3.0)
         state = graph.nodes['compensator']
         assert state.findings.class_deg == size_deg
-        graph.set('console', source='motion', motion='non_periodic')
+        graph.set('master', source='motion', motion='non_periodic')
         graph.advance(4.3)
         moved = graph.calibrate()
         assert moved['class_deg'] == values['class_deg']
@@ -140,7 +140,9 @@ def abort_reason(graph):
 
 
 def test_stale_load_cells_abort_and_the_slave_stands_still():
-    with SimulatedGraph(overrides={'conductor': {'wait_for': ['motor/measured_js']}}) as graph:
+    with SimulatedGraph(
+        overrides={'simulation_clock': {'wait_for': ['motor/measured_js']}}
+    ) as graph:
         graph.enable()
         assert graph.call_calibration().success
         graph.advance(3.0)
@@ -230,9 +232,9 @@ def test_feedback_says_by_codes_how_orders_fare():
 def test_home_returns_to_zero():
     with SimulatedGraph() as graph:
         graph.enable()
-        graph.set('console', source='motion')
+        graph.set('master', source='motion')
         graph.advance(1.5)
-        graph.set('console', source='none')
+        graph.set('master', source='none')
         graph.advance(0.3)
         graph.command('home')
         shafts = graph.listen('motor/measured_js', ('motor_x', 'motor_y'))

@@ -183,7 +183,7 @@ def test_a_domain_that_cannot_be_is_refused(monkeypatch, given):
 def test_an_enable_waits_until_the_graph_is_whole_and_says_for_what():
     overrides = {
         'load_cells': {'connected': False},
-        'conductor': {'wait_for': ['motor/measured_js']},
+        'simulation_clock': {'wait_for': ['motor/measured_js']},
     }
     with (
         SimulatedGraph(overrides=overrides) as graph,

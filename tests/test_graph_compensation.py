@@ -23,11 +23,11 @@ def motion_file(tmp_path):
 
 def track(graph, desired, measured):
     """RMSE in rad of the tracker's angle, both joints, over the steady part of ``60 sin t``."""
-    graph.set('console', source='none')
+    graph.set('master', source='none')
     graph.advance(0.3)
     desired.clear()
     measured.clear()
-    graph.set('console', source='file')
+    graph.set('master', source='file')
     graph.advance(SIGNAL.duration + 0.5)
     begin, end = SIGNAL.steady
     start = desired[0].stamp_ns
@@ -45,7 +45,7 @@ def test_feed_forward_and_feedback_reduce_the_error_of_60_sin_t(tmp_path, motion
     """
     overrides = tube_of_size(tmp_path, 65, 903)
     overrides |= {'compensator': {'mode': 'none'}, 'controller': {'active': False}}
-    overrides['console'] = {'command_file': str(motion_file)}
+    overrides['master'] = {'command_file': str(motion_file)}
     with SimulatedGraph(overrides=overrides, tick_rate=100) as graph:
         streams = [graph.listen(t) for t in ('slave/servo_jp', 'slave/measured_js')]
         graph.enable()
@@ -66,7 +66,7 @@ def test_switching_while_moving_does_not_jump():
         drives = graph.listen('motor/servo_jp', ('motor_x', 'motor_y'))
         graph.enable()
         graph.calibrate()
-        graph.set('console', source='motion')
+        graph.set('master', source='motion')
         graph.advance(6.2)
         for node, change in (('controller', {'active': False}), ('compensator', {'mode': 'none'})):
             drives.clear()

@@ -18,7 +18,7 @@ def test_every_mode_comes_in_while_moving_without_a_jump(tmp_path):
         node = graph.nodes['compensator']
         assert node._compiled == {'bouc_wen'}
         assert len(node.findings.plants) == 2
-        graph.set('console', source='motion')
+        graph.set('master', source='motion')
         graph.advance(2.0)
         for mode in (*MODES[1:], 'none', 'bouc_wen'):
             graph.set('compensator', selected_by='plant' if 'physical' in mode else 'size')

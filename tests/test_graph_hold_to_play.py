@@ -33,7 +33,7 @@ def graph(tmp_path_factory):
     file = tmp_path_factory.mktemp('motion') / 'motion.csv'
     angle = np.linspace(0.0, REACH, 101)
     write_command_file(file, np.linspace(0.0, RAMP_S, 101), np.stack([angle, -angle], axis=1))
-    with run(overrides={'console': {'command_file': str(file), 'hold_to_play': True}}) as graph:
+    with run(overrides={'master': {'command_file': str(file), 'hold_to_play': True}}) as graph:
         yield graph
 
 
@@ -43,9 +43,9 @@ def hand(graph):
     graph.command('disable')
     graph.enable()
     hand = Hand(graph)
-    graph.set('console', source='file')
+    graph.set('master', source='file')
     yield hand
-    graph.set('console', source='none')
+    graph.set('master', source='none')
     graph.probe.destroy_publisher(hand.clutch_publisher)
     graph.connect()
 
@@ -112,19 +112,19 @@ def test_a_pause_ends_it_and_what_is_resumed_waits_for_the_hand(graph, hand):
 
 
 def test_the_master_leaves_the_clutch_to_the_operator_and_takes_it_back():
-    with run(overrides={'console': {'hold_to_play': True}}) as graph:
-        console = graph.nodes['console']
+    with run(overrides={'master': {'hold_to_play': True}}) as graph:
+        console = graph.nodes['master']
         clutch = f'{console.get_namespace()}/{MASTER_CLUTCH}'
-        graph.set('console', source='motion')
+        graph.set('master', source='motion')
         commands = graph.listen('slave/servo_jp')
         graph.advance(0.3)
         assert console.count_publishers(clutch) == 0
         assert commands == []
-        graph.set('console', hold_to_play=False)
+        graph.set('master', hold_to_play=False)
         graph.advance(0.6)
         assert console.count_publishers(clutch) == 1
         assert len(commands) > 0.5 * TICK_RATE
-        graph.set('console', hold_to_play=True)
+        graph.set('master', hold_to_play=True)
         graph.advance(0.1)
         commands.clear()
         graph.advance(0.3)

@@ -29,7 +29,7 @@ def whole_run():
         streams = {topic: graph.listen(topic, names) for topic, names in STREAMS.items()}
         graph.enable()
         result = graph.calibrate()
-        graph.set('console', source='motion', motion='non_periodic')
+        graph.set('master', source='motion', motion='non_periodic')
         graph.advance(3.0)
         return streams, result
 
@@ -86,7 +86,7 @@ def test_the_graphs_motors_are_the_plants():
         wires = graph.listen('simulation/wires', WIRES)
         drives = graph.listen('motor/servo_jp', MOTORS)
         graph.enable()
-        graph.set('console', source='motion')
+        graph.set('master', source='motion')
         graph.advance(3.0)
     commands = np.zeros((len(shafts), 2))
     in_force = {d.stamp_ns: d.position for d in drives}
@@ -108,7 +108,7 @@ def test_the_graphs_motors_are_the_plants():
     [('load_cells', 'wires/measured_js'), ('motor_driver', 'motor/measured_js')],
 )
 def test_the_topic_that_is_waited_for_is_named(missing, topic):
-    overrides = {'conductor': {'timeout': 0.2}}
+    overrides = {'simulation_clock': {'timeout': 0.2}}
     with (
         SimulatedGraph(without=(missing,), overrides=overrides) as graph,
         pytest.raises(BarrierTimeout, match=topic),

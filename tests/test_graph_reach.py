@@ -51,7 +51,7 @@ def test_a_calibration_finds_the_reach_and_the_master_keeps_to_it(tmp_path):
         true = [(tube.low, tube.high) for tube in tubes]
         np.testing.assert_allclose(np.degrees(found), np.degrees(true), atol=5.0)
         commands = graph.listen(SLAVE_COMMAND)
-        graph.set('console', source='motion')
+        graph.set('master', source='motion')
         graph.advance(4.0)
         asked = np.max([c.position for c in commands], axis=0)
         # The master brakes as the acceleration allows; the compensator cuts the way of braking.
@@ -68,7 +68,7 @@ def test_the_compensator_cuts_what_a_master_asks_for_beyond_it():
             ranges=(BendingRange(-0.2, 0.3),) * 2
         )
         asked, drives = graph.listen(SLAVE_COMMAND), graph.listen(MOTOR_COMMAND, MOTORS)
-        graph.set('console', source='motion')
+        graph.set('master', source='motion')
         graph.advance(2.5)
         assert max(a.position[0] for a in asked) > 0.8
         assert max(d.position[0] for d in drives) == pytest.approx(0.3 * gear, abs=2e-3)
@@ -113,9 +113,9 @@ def test_home_leads_back_from_shafts_beyond_the_reach():
         graph.enable()
         compensator.findings = CalibrationFindings(class_deg=100)
         graph.set('compensator', mode='dahl')
-        graph.set('console', source='motion')
+        graph.set('master', source='motion')
         graph.advance(2.0)
-        graph.set('console', source='none')
+        graph.set('master', source='none')
         graph.advance(0.3)
         shafts = graph.listen(MOTOR_MEASURED, MOTORS)
         graph.advance(0.02)

@@ -22,7 +22,7 @@ def test_a_blind_tracker_fades_the_feedback_out_and_back_in_without_a_jump():
         assert (at_rest.level, at_rest.message) == (b'\x00', 'waiting for slave/servo_jp')
         graph.enable()
         graph.calibrate()
-        graph.set('console', source='motion', motion='non_periodic')
+        graph.set('master', source='motion', motion='non_periodic')
         graph.advance(4.0)
         assert weight(graph) == 1.0
         drives.clear()
@@ -49,7 +49,7 @@ def test_a_dead_tracker_node_leaves_the_feed_forward_going():
         drives = graph.listen('motor/servo_jp', ('motor_x', 'motor_y'))
         graph.enable()
         graph.calibrate()
-        graph.set('console', source='motion')
+        graph.set('master', source='motion')
         graph.advance(3.0)
         graph.kill('em_tracker')
         drives.clear()

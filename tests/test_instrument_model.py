@@ -28,7 +28,7 @@ def bag(tmp_path_factory):
         extra=(*SHOWING_NODES, RecorderNode), overrides={'recorder': {'bag': str(path)}}, rig=RIG
     ) as graph:
         graph.enable()
-        graph.set('console', source='motion', motion='non_periodic')
+        graph.set('master', source='motion', motion='non_periodic')
         graph.advance(2.0)
     assert graph.nodes['recorder'].last_report.complete
     return open_bag(path)

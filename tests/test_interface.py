@@ -35,7 +35,7 @@ def nodes():
                     args=['--ros-args', '--log-level', 'fatal'],
                     context=Context(),
                     domain_id=domain,
-                    overrides={'console': {'source': 'motion'}, 'watch': {'active': True}},
+                    overrides={'master': {'source': 'motion'}, 'watch': {'active': True}},
                 )
             ).add(factory)
             for factory in (*SLAVE_NODES, *CONTROL_NODES, *SHOWING_NODES)
@@ -114,5 +114,5 @@ def test_every_node_declares_the_parameters_that_are_listed(nodes):
 
 def test_every_node_is_named_as_it_is(nodes):
     named = {name for topic in TOPICS for name in (*topic.said_by, *topic.heard_by)}
-    others = {'every node', 'conductor', 'recorder', 'replay'}
+    others = {'every node', 'simulation_clock', 'recorder', 'replay'}
     assert named - others == set(nodes)

@@ -58,14 +58,14 @@ def test_a_motion_is_played_in_a_session_of_its_own_and_leaves_everything_as_it_
     asked = []
     with graph() as live:
         client = live.client
-        live.set('console', source='master')
+        live.set('master', source='master')
         player = MotionPlayer(client, lambda words: asked.append(words) or True)
         player.play(*motion, tmp_path / 'bag')
         live.advance(1.0)
         assert client.state == 'DISABLED'
         assert not client.session
         assert read_parameter(client, 'compensator.mode').value == 'bouc_wen'
-        assert read_parameter(client, 'console.source').value == 'master'
+        assert read_parameter(client, 'master.source').value == 'master'
         assert abs(live.shafts[0]) < 0.05
     assert asked == ['Play this motion: There and back of bend_x, 2 s, at most 29 deg?']
     commands = open_bag(tmp_path / 'bag').joint_state(SLAVE_COMMAND).select(JOINTS)
@@ -136,7 +136,7 @@ def test_an_interruption_pauses_the_graph(motion, tmp_path):
             MotionPlayer(client, lambda words: True).play(*motion, tmp_path / 'bag')
         assert client.state == 'PAUSED'
         live.advance(0.5)
-        assert read_parameter(client, 'console.source').value == 'none'
+        assert read_parameter(client, 'master.source').value == 'none'
         # It is continued from there.
         client.serve = inner
         MotionPlayer(client, lambda words: True).play(*motion, tmp_path / 'again')

@@ -198,7 +198,7 @@ def test_a_dead_man_who_lets_go_stops_the_motion(graph, motion, tmp_path, strang
     assert stands_still(graph)
 
 
-@pytest.mark.parametrize('name', ['console', 'supervisor'])
+@pytest.mark.parametrize('name', ['master', 'supervisor'])
 def test_a_node_that_dies_ends_the_motion(graph, motion, tmp_path, monkeypatch, name):
     # What it then asks in vain is waited for less long, so that the test is not.
     monkeypatch.setattr(motion_player, 'PATIENCE_S', 5.0)

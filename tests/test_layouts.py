@@ -50,7 +50,7 @@ def messages(tmp_path_factory):
         extra=(*SHOWING_NODES, RecorderNode), overrides={'recorder': {'bag': str(path)}}
     ) as graph:
         graph.enable()
-        graph.set('console', source='motion')
+        graph.set('master', source='motion')
         graph.advance(1.5)
     bag = open_bag(path)
     return {

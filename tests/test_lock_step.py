@@ -161,10 +161,10 @@ def test_two_rigs_of_a_domain_have_a_clock_each():
 
 def test_a_hand_that_falls_silent_in_slow_time_is_let_go_of_by_the_wall():
     with SimulatedGraph(
-        overrides={'conductor': {'speed': 0.5}, 'console': {'source': 'master'}}
+        overrides={'simulation_clock': {'speed': 0.5}, 'master': {'source': 'master'}}
     ) as graph:
         graph.enable()
-        console = graph.nodes['console']
+        console = graph.nodes['master']
         hand = Handle(graph)
         while not console._handle.engaged:
             hand.move(0.1, (0.2, 0.0))

@@ -27,7 +27,7 @@ foreign, master = commanded_graph.foreign, commanded_graph.master
 
 def test_pause_holds_and_resume_goes_on_without_a_jump():
     with run() as graph:
-        graph.set('console', source='motion')
+        graph.set('master', source='motion')
         graph.advance(2.0)
         moved = Moved(graph)
         first = graph.session
@@ -48,7 +48,7 @@ def test_pause_holds_and_resume_goes_on_without_a_jump():
 def test_over_tension_is_a_fault_that_latches():
     rig = dataclasses.replace(RIG, tension=dataclasses.replace(RIG.tension, ceiling=8.0))
     with run(rig=rig) as graph:
-        graph.set('console', source='motion')
+        graph.set('master', source='motion')
         graph.advance(2.8)
         assert graph.state == 'FAULT'
         assert 'over the ceiling' in graph.cause
@@ -70,7 +70,7 @@ def test_a_slave_whose_wires_are_too_tight_at_rest_is_not_enabled():
 
 
 def test_load_cells_unplugged_are_a_fault_that_torque_off_leaves_at_any_time():
-    with run(overrides={'conductor': {'wait_for': ['motor/measured_js']}}) as graph:
+    with run(overrides={'simulation_clock': {'wait_for': ['motor/measured_js']}}) as graph:
         graph.set('load_cells', connected=False)
         graph.advance(0.5)
         assert graph.state == 'FAULT'
@@ -247,9 +247,9 @@ def test_after_a_rest_of_two_minutes_all_that_moves_the_slave_is_obeyed():
         graph.enable()
         session = graph.session
         shafts = graph.listen(MOTOR_MEASURED, MOTORS)
-        graph.set('console', source='motion')
+        graph.set('master', source='motion')
         graph.advance(1.5)
-        graph.set('console', source='none')
+        graph.set('master', source='none')
         graph.advance(0.5)
         assert max(map(abs, shafts[-1].position)) > 0.1
         graph.advance(101.0)
@@ -310,7 +310,7 @@ def test_commands_that_are_refused_while_the_clutch_is_held_are_a_fault_and_said
 
 
 def test_engaging_re_references_without_a_jump():
-    with run(overrides={'console': {'source': 'master', 'scale': 0.5}}) as graph:
+    with run(overrides={'master': {'source': 'master', 'scale': 0.5}}) as graph:
         commands = graph.listen(SLAVE_COMMAND)
         handle = Handle(graph)
         handle.move(0.4, (0.5, 0.0))
@@ -320,7 +320,7 @@ def test_engaging_re_references_without_a_jump():
         released = len(commands)
         handle.move(0.2, (2.0, 2.0), clutch=False)
         assert len(commands) == released
-        pose = graph.nodes['console']._pose.bending()
+        pose = graph.nodes['master']._pose.bending()
         handle.move(0.4, (0.0, 0.5))
         assert commands[released].position == pytest.approx(pose, abs=0.02)
         steps = np.abs(np.diff([c.position for c in commands[released:]], axis=0))
@@ -329,7 +329,7 @@ def test_engaging_re_references_without_a_jump():
 
 def test_a_clutch_held_through_an_interrupted_calibration_moves_nothing():
     """The master engages at the measured pose, not at its own last command."""
-    with run(overrides={'console': {'source': 'master'}}) as graph:
+    with run(overrides={'master': {'source': 'master'}}) as graph:
         handle = Handle(graph)
         handle.move(0.6, (0.7, 0.7))
         assert graph.call_calibration().success
@@ -346,7 +346,7 @@ def test_a_clutch_held_through_an_interrupted_calibration_moves_nothing():
 
 @pytest.mark.parametrize('rate', [50, 100, 250])
 def test_a_handle_of_any_rate_is_followed_smoothly(rate):
-    with run(overrides={'console': {'source': 'master'}}) as graph:
+    with run(overrides={'master': {'source': 'master'}}) as graph:
         commands = graph.listen(SLAVE_COMMAND)
         moved = Moved(graph)
         handle = Handle(graph, rate)
@@ -357,14 +357,14 @@ def test_a_handle_of_any_rate_is_followed_smoothly(rate):
         assert speeds.max() < 0.75
         assert speeds.min() > 0.25
         assert moved.largest_step < BOUND
-        assert not any(graph.nodes['console']._handle.refused.values())
+        assert not any(graph.nodes['master']._handle.refused.values())
 
 
 def test_a_handle_at_rest_with_a_count_of_noise_leaves_the_tip_at_rest():
     noise = np.random.default_rng(4)
     with run(overrides={'calibration': {'motion': 'brief'}}) as graph:
         graph.calibrate()
-        graph.set('console', source='master')
+        graph.set('master', source='master')
         handle, moved = Handle(graph), Moved(graph)
         for rate in (50, TICK_RATE):
             handle.rate = rate
@@ -380,7 +380,7 @@ def test_a_handle_at_rest_with_a_count_of_noise_leaves_the_tip_at_rest():
 
 
 def test_unusable_handle_messages_are_counted_and_said():
-    with run(overrides={'console': {'source': 'master'}}) as graph:
+    with run(overrides={'master': {'source': 'master'}}) as graph:
         handle = Handle(graph)
         handle.move(0.2)
         handle.send([math.nan, 0.0], session='')
@@ -394,22 +394,22 @@ def test_unusable_handle_messages_are_counted_and_said():
 
 @pytest.mark.parametrize('source', ['none', 'motion'])
 def test_a_handle_that_nothing_follows_is_said_with_what_to_do(source):
-    with run(overrides={'console': {'source': source}}) as graph:
-        master, said = graph.nodes['console'], []
+    with run(overrides={'master': {'source': source}}) as graph:
+        master, said = graph.nodes['master'], []
         # While a motion is played the handle's clutch is a second one: an error of its own.
         master.get_logger = lambda: SimpleNamespace(warning=said.append, error=lambda _: None)
         handle = Handle(graph)
         handle.move(1.1, clutch=False)
         assert not said
         handle.move(3.0, (0.05, 0.0), clutch=False)
-        advice = 'endoscope operate set console.source master'
+        advice = 'endoscope operate set master.source master'
         told = graph.diagnostics['console: commands'][-1]
         assert told.level == WARN
         assert told.message == (
             f"the handle moves and nothing follows it: the master's source is {source}; {advice}"
         )
         assert said == [told.message]
-        graph.set('console', source='master')
+        graph.set('master', source='master')
         handle.move(2.1, (0.05, 0.0), clutch=False)
         assert advice not in graph.diagnostics['console: commands'][-1].message
         assert len(said) == 1
@@ -426,7 +426,7 @@ def test_a_clutch_that_holds_nothing_is_said_unless_a_program_commands_the_slave
 
 
 def test_a_handle_that_falls_silent_stands_and_is_taken_up_where_the_slave_is():
-    with run(overrides={'console': {'source': 'master'}}) as graph:
+    with run(overrides={'master': {'source': 'master'}}) as graph:
         handle = Handle(graph)
         handle.move(1.0, (0.5, 0.5))
         moved = Moved(graph)

@@ -28,7 +28,7 @@ NODES = (
     'compensator',
     'controller',
     'calibration',
-    'console',
+    'master',
 )
 PATIENCE_S = 300.0
 RIG = 'timeouts: {command: 1.0, stream: 10.0, handle: 1.0}'
@@ -107,7 +107,7 @@ def rig(tmp_path):
 
 @pytest.mark.nightly
 def test_each_node_is_a_process_and_stops_cleanly(operator, rig):
-    plays = {'console': ['-p', 'source:=motion']}
+    plays = {'master': ['-p', 'source:=motion']}
     processes = {node: start(PROGRAMS[node].name, *rig, *plays.get(node, [])) for node in NODES}
     try:
         operator.wait_until(lambda: operator.heard >= set(NODES))
@@ -125,7 +125,7 @@ def test_each_node_is_a_process_and_stops_cleanly(operator, rig):
 def test_the_whole_graph_in_motion_stops_cleanly(operator, rig, tmp_path):
     bag = tmp_path / 'bag'
     params = tmp_path / 'console.yaml'
-    params.write_text('/**/console: {ros__parameters: {source: motion}}\n')
+    params.write_text('/**/master: {ros__parameters: {source: motion}}\n')
     process = start('graph', '--params-file', str(params), '-p', f'bag:={bag}', *rig)
     try:
         operator.wait_until(

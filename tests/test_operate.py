@@ -137,12 +137,12 @@ def test_home_is_refused_while_a_calibration_is_running(graph):
     ('name', 'text', 'value'),
     [
         ('compensator.mode', 'physical', 'physical'),
-        ('console.scale', '0.5', 0.5),
-        ('console.scale', '1', 1.0),
-        ('console.joints', '[bend_x]', ['bend_x']),
+        ('master.scale', '0.5', 0.5),
+        ('master.scale', '1', 1.0),
+        ('master.joints', '[bend_x]', ['bend_x']),
         ('controller.active', 'false', False),
         ('controller.active', 'true', True),
-        ('console.joints', 'bend_x, bend_y', ['bend_x', 'bend_y']),
+        ('master.joints', 'bend_x, bend_y', ['bend_x', 'bend_y']),
         ('compensator.mode', 'bouc_wen', 'bouc_wen'),
     ],
 )
@@ -165,9 +165,9 @@ def test_parameters_are_set_by_their_own_type_and_can_be_read_again(graph, name,
             2,
             "endoscope: 'mode': give NODE.PARAMETER, for example compensator.mode",
         ),
-        (['set', 'console.scale', 'big'], 2, "endoscope: console.scale is a number, not 'big'"),
+        (['set', 'master.scale', 'big'], 2, "endoscope: master.scale is a number, not 'big'"),
         (['set', 'controller.active', '1'], 2, 'controller.active is true or false'),
-        (['set', 'console.scale', '100'], 1, "'scale' is 100.0; give a finite number, from 0.01"),
+        (['set', 'master.scale', '100'], 1, "'scale' is 100.0; give a finite number, from 0.01"),
         (['set', 'compensator.mode', 'physicl'], 1, 'did you mean physical?'),
         (['set', 'motor_driver.tick_rate', '100'], 1, 'read-only'),
     ],
@@ -185,7 +185,7 @@ def test_the_parameters_of_a_node_are_listed_with_their_values_and_ranges(graph)
     [mode] = [line for line in out.splitlines() if line.startswith('compensator.mode ')]
     assert '= bouc_wen' in mode
     assert 'physical' in mode
-    status, out, _ = graph.run('operate', 'get', 'console', '--json')
+    status, out, _ = graph.run('operate', 'get', 'master', '--json')
     told = json.loads(out)['parameters']
     assert told['scale']['value'] == 1.0
     assert 'from 0.01' in told['scale']['description']
@@ -242,17 +242,17 @@ def test_status_names_every_node_and_the_source_of_the_master(graph):
     assert status == 0
     lines = {line.split()[0]: line for line in out.splitlines()}
     assert lines['state'].endswith('DISABLED; `endoscope operate enable` lets it move')
-    assert lines['console'].split()[1:] == ['source', 'none'] or 'ok' in lines['console']
+    assert lines['master'].split()[1:] == ['source', 'none'] or 'ok' in lines['master']
     for name in graph.nodes:
-        assert name in out or name == 'conductor'
+        assert name in out or name == 'simulation_clock'
     said = json.loads(graph.run('operate', 'status', '--json')[1])
     assert said['state'] == 'DISABLED'
-    assert said['console_source'] == 'none'
+    assert said['master_source'] == 'none'
     assert said['not_heard'] == []
     assert set(said['nodes']) >= {'supervisor: operating state', 'calibration: procedure'}
 
 
-@pytest.mark.parametrize('words', [['status'], ['enable'], ['get', 'console.scale'], ['calibrate']])
+@pytest.mark.parametrize('words', [['status'], ['enable'], ['get', 'master.scale'], ['calibrate']])
 def test_without_a_graph_it_says_what_was_not_found(words, monkeypatch, capsys):
     domain = private_domain()
     monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
@@ -268,7 +268,7 @@ def test_without_a_graph_it_says_what_was_not_found(words, monkeypatch, capsys):
     [
         ['operate'],
         ['operate', 'enabel'],
-        ['operate', 'set', 'console.scale'],
+        ['operate', 'set', 'master.scale'],
         ['operate', 'record', 'pause'],
         ['operate', 'enable', '--timeout', '-1'],
         ['topics', '--hz', 'a'],

@@ -28,22 +28,22 @@ def recorded(tmp_path_factory):
     overrides = {'motor_driver': {'seed': 3}}
     with LiveGraph(bag, private_domain(), lock_step=True, overrides=overrides) as graph:
         graph.client.ask('enable')
-        graph.set('console', source='motion', motion='periodic')
+        graph.set('master', source='motion', motion='periodic')
         graph.advance(4.3)
-        graph.set('console', source='none')
+        graph.set('master', source='none')
         graph.advance(1.0)
-        graph.set('console', source='motion', motion='non_periodic')
+        graph.set('master', source='motion', motion='non_periodic')
         graph.advance(1.9)
         graph.client.ask('pause')
         graph.advance(0.5)
         graph.client.ask('resume')
         graph.advance(1.5)
-        graph.set('console', source='none')
+        graph.set('master', source='none')
         graph.advance(1.0)
         graph.client.ask('disable')
         graph.advance(0.4)
         graph.client.ask('enable')
-        graph.set('console', source='motion', motion='periodic')
+        graph.set('master', source='motion', motion='periodic')
         graph.advance(2.0)
         graph.stop()
     return bag
@@ -69,11 +69,11 @@ def of_another_rig(tmp_path_factory):
     bag = tmp_path_factory.mktemp('other') / 'bag'
     with LiveGraph(bag, private_domain(), lock_step=True, overrides={}, rate=250, rig=rig) as graph:
         graph.client.ask('enable')
-        graph.set('console', source='motion', motion='periodic')
+        graph.set('master', source='motion', motion='periodic')
         graph.advance(2.2)
-        graph.set('console', source='none')
+        graph.set('master', source='none')
         graph.advance(1.0)
-        graph.set('console', source='motion', motion='non_periodic')
+        graph.set('master', source='motion', motion='non_periodic')
         graph.advance(2.0)
         graph.stop()
     return bag, rig
@@ -117,11 +117,11 @@ def test_a_stop_is_replayed_as_the_driver_made_it(tmp_path):
     bag = tmp_path / 'bag'
     with LiveGraph(bag, private_domain(), lock_step=True, overrides={}, rate=250) as graph:
         graph.client.ask('enable')
-        graph.set('console', source='motion', motion='periodic')
+        graph.set('master', source='motion', motion='periodic')
         graph.advance(1.5)
         graph.set('load_cells', connected=False)
         graph.client.wait_for(lambda: graph.client.state == 'FAULT', 'FAULT')
-        graph.set('console', source='none')
+        graph.set('master', source='none')
         graph.set('load_cells', connected=True)
         stopped = graph.now()
         graph.advance(1.5)

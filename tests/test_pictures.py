@@ -12,7 +12,7 @@ from endoscope_nodes.topics import TOPICS
 
 DOC = WORKSPACE / 'doc'
 NODES = {
-    *('console', 'compensator', 'controller', 'calibration', 'supervisor'),
+    *('master', 'compensator', 'controller', 'calibration', 'supervisor'),
     *('motor_driver', 'load_cells', 'em_tracker', 'instrument_model'),
 }
 

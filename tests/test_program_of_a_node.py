@@ -121,7 +121,7 @@ def test_one_started_by_nohup_outlives_the_terminal_and_is_called_what_it_will_b
 )
 def test_the_graph_says_what_it_was_given_when_it_is_ready_and_what_to_do(tmp_path, words, pace):
     parameters = tmp_path / 'rig.yaml'
-    parameters.write_text('/**/console: {ros__parameters: {source: none, scale: 0.5}}\n')
+    parameters.write_text('/**/master: {ros__parameters: {source: none, scale: 0.5}}\n')
     process = start(
         'graph',
         *words,
@@ -182,17 +182,6 @@ def test_help_tells_every_parameter(node):
                 assert f'{parameter.allowed} {parameter.unit}'.strip() in told
 
 
-@pytest.mark.parametrize(
-    ('old', 'name'), [('console', 'master'), ('conductor', 'simulation_clock')]
-)
-def test_an_old_name_starts_the_program_and_says_what_it_is_called(old, name):
-    code, out, errors = ended(old, '--help')
-    assert code == 0
-    assert out.startswith(f'usage: {name} ')
-    [line] = errors.splitlines()
-    assert line.startswith(f'{old}: this program is called {name}; ')
-
-
 def test_help_loads_neither_ros_nor_anything_that_computes():
     code = (
         'import sys\n'
@@ -241,7 +230,7 @@ def test_a_node_is_healthy_while_it_speaks(tmp_path):
     try:
         wait_for_line(process, 'recording to')
         heard = healthcheck('recorder', domain)
-        silent = healthcheck('console', domain)
+        silent = healthcheck('master', domain)
     finally:
         process.kill()
         process.communicate()

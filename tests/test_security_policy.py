@@ -7,12 +7,12 @@ from simulated_graph import SimulatedGraph
 from endoscope_nodes.nodes.recorder import RecorderNode
 
 SOLE_PUBLISHERS = {
-    'slave/servo_jp': {'console'},
+    'slave/servo_jp': {'master'},
     'motor/servo_jp': {'compensator'},
     'slave/operating_state': {'supervisor'},
     'slave/motion_session': {'supervisor'},
     'slave/state_command': {'operator', 'console_web', 'investigate'},
-    'master/clutch': {'console', 'master', 'console_web', 'investigate'},
+    'master/clutch': {'master', 'handle', 'console_web', 'investigate'},
     'compensator/adopt': {'operator', 'console_web', 'investigate'},
 }
 
@@ -36,7 +36,7 @@ def test_every_node_may_do_what_it_does(tmp_path):
     with SimulatedGraph(extra=(RecorderNode,), overrides=overrides) as graph:
         for node in graph.runtime.nodes:
             name = node.get_name()
-            if name == 'conductor':
+            if name == 'simulation_clock':
                 continue
             published = node.get_publisher_names_and_types_by_node(name, NAMESPACE)
             heard = node.get_subscriber_names_and_types_by_node(name, NAMESPACE)

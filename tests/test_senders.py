@@ -69,7 +69,7 @@ def leave_behind(graph, node, topic, message, qos):
 
 def test_two_senders_of_a_motion_topic_are_a_fault_that_names_both():
     with run() as graph:
-        graph.set('console', source='motion')
+        graph.set('master', source='motion')
         graph.advance(2.0)
         moved = Moved(graph)
         for topic, names, value in (
@@ -152,7 +152,7 @@ def test_a_heartbeat_that_outlives_its_sender_opens_nothing(foreign, master):
 def test_a_clutch_that_outlives_its_sender_is_not_held_before_it_is_let_go_of(foreign, master):
     master.move(0.04)
     master.hold(0)
-    clutches = [foreign.nodes[name]._clutch for name in ('compensator', 'console')]
+    clutches = [foreign.nodes[name]._clutch for name in ('compensator', 'master')]
     foreign.advance(0.1)
     leave_behind(foreign, foreign.nodes['compensator'], MASTER_CLUTCH, Joy(buttons=[1]), EVENT)
     held = []
@@ -175,7 +175,7 @@ def test_a_handle_that_outlives_its_sender_is_not_followed(foreign):
     foreign.enable()
     handle = Handle(foreign)
     handle.move(0.2, clutch=False)
-    master = foreign.nodes['console']
+    master = foreign.nodes['master']
     taken = []
     take = master._handle.take
     master._handle.take = lambda *sample: (taken.append(sample[1]), take(*sample))[1]
@@ -192,13 +192,13 @@ def test_a_handle_that_outlives_its_sender_is_not_followed(foreign):
     assert MASTER_MEASURED in foreign.cause
 
 
-@pytest.mark.parametrize('reader', ['compensator', 'console'])
+@pytest.mark.parametrize('reader', ['compensator', 'master'])
 def test_a_result_that_outlives_its_sender_is_not_taken(reader):
     """Of the very session in which the slave is being calibrated."""
     with run() as graph:
         assert graph.call_calibration().success
         graph.advance(0.5)
-        compensator, master = graph.nodes['compensator'], graph.nodes['console']
+        compensator, master = graph.nodes['compensator'], graph.nodes['master']
         assert compensator._calibrated_in == graph.session
         ranges = {f'reach.{joint}.{end}': x for joint in JOINTS for end, x in LOW_REACH.items()}
         result = DiagnosticArray()
@@ -208,7 +208,7 @@ def test_a_result_that_outlives_its_sender_is_not_taken(reader):
         ]
         leave_behind(graph, graph.nodes[reader], CALIBRATION_RESULT, result, RESULT)
         graph.advance(0.5)
-        taken = {'compensator': compensator._found, 'console': master._ranges}
+        taken = {'compensator': compensator._found, 'master': master._ranges}
         assert not taken[reader]
         assert graph.state == 'FAULT'
         assert CALIBRATION_RESULT in graph.cause
@@ -217,7 +217,7 @@ def test_a_result_that_outlives_its_sender_is_not_taken(reader):
 @pytest.mark.parametrize('session', ['', 'session-99'])
 def test_a_rival_of_the_supervisor_moves_nothing(session):
     with run() as graph:
-        graph.set('console', source='motion')
+        graph.set('master', source='motion')
         graph.command('disable')
         graph.advance(0.5)
         moved = Moved(graph)
@@ -236,7 +236,7 @@ def test_a_rival_of_the_supervisor_moves_nothing(session):
 
 def test_a_result_of_somebody_else_changes_nothing():
     with run() as graph:
-        graph.set('console', source='motion')
+        graph.set('master', source='motion')
         graph.advance(2.0)
         result = DiagnosticArray()
         result.header.frame_id = graph.session
@@ -275,7 +275,7 @@ def test_health_of_another_rig_is_not_ours(prefix):
 
 def test_a_dead_supervisor_stops_the_motion_within_a_fifth_of_a_second():
     with run() as graph:
-        graph.set('console', source='motion')
+        graph.set('master', source='motion')
         graph.advance(2.0)
         moved = Moved(graph)
         graph.kill('supervisor')
@@ -294,9 +294,9 @@ def test_a_dead_supervisor_stops_the_motion_within_a_fifth_of_a_second():
         assert moved.largest_step < BOUND
 
 
-@pytest.mark.parametrize('name', ['compensator', 'console', 'controller'])
+@pytest.mark.parametrize('name', ['compensator', 'master', 'controller'])
 def test_a_node_started_anew_needs_another_enable(name):
-    with run(overrides={'console': {'source': 'motion'}}) as graph:
+    with run(overrides={'master': {'source': 'motion'}}) as graph:
         graph.advance(2.5)
         graph.kill(name)
         graph.advance(0.02)
@@ -328,7 +328,7 @@ def test_a_calibration_node_started_anew_is_believed_after_another_enable():
         graph.advance(0.1)
         assert graph.state == 'ENABLED'
         assert graph.nodes['compensator'].findings is not None
-        assert graph.nodes['console']._ranges
+        assert graph.nodes['master']._ranges
         graph.kill('compensator')
         graph.advance(0.02)
         graph.start('compensator')
@@ -342,7 +342,7 @@ def test_a_tracker_that_comes_back_moves_nothing():
     with run(overrides={'calibration': {'motion': 'brief'}}) as graph:
         graph.calibrate()
         handle = Handle(graph)
-        graph.set('console', source='master')
+        graph.set('master', source='master')
         handle.move(2.0, (0.4, 0.3))
         handle.move(0.5)
         moved = Moved(graph)

@@ -49,13 +49,13 @@ def graph(running):
         'the end of teleop',
     )
     running.command('disable')
-    running.set('console', source='none', scale=1.0)
+    running.set('master', source='none', scale=1.0)
     running.clutches.clear()
     return running
 
 
 def source(graph):
-    return graph.nodes['console'].get_parameter('source').value
+    return graph.nodes['master'].get_parameter('source').value
 
 
 def moved(typist):
@@ -138,12 +138,12 @@ def test_a_press_without_release_ends_by_itself(graph):
 def test_a_signal_releases_the_clutch_and_restores_everything(graph, number):
     with Typist(graph, '--take', '--scale', '0.5') as typist:
         typist.enable()
-        typist.until(lambda: graph.nodes['console'].get_parameter('scale').value == 0.5)
+        typist.until(lambda: graph.nodes['master'].get_parameter('scale').value == 0.5)
         typist.hold(W, until=lambda: moved(typist)[1] > FAR)
         typist.process.send_signal(number)
         assert typist.end() == 128 + number
         check_left_as_found(graph, typist)
-        assert graph.nodes['console'].get_parameter('scale').value == 1.0
+        assert graph.nodes['master'].get_parameter('scale').value == 1.0
         assert typist.stands()
 
 
@@ -237,7 +237,7 @@ def test_it_says_why_nothing_moves(graph):
 
 
 def test_a_motion_that_the_master_played_does_not_begin_anew_with_nobody_looking(graph):
-    graph.set('console', source='motion')
+    graph.set('master', source='motion')
     with Typist(graph, '--take') as typist:
         typist.enable()
         typist.type(b'q')

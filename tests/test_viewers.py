@@ -79,7 +79,7 @@ class Viewer:
 def graph():
     with SimulatedGraph(extra=SHOWING_NODES) as graph:
         graph.enable()
-        graph.set('console', source='motion', motion='non_periodic')
+        graph.set('master', source='motion', motion='non_periodic')
         yield graph
 
 

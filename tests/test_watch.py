@@ -48,7 +48,7 @@ def watched(files):
     overrides = {
         'watch': {'active': True, 'plant': str(files / 'described.yaml')},
         'motor_driver': {'plant_file': str(files / 'true.yaml')},
-        'console': {'source': 'file', 'command_file': str(files / 'motion.csv')},
+        'master': {'source': 'file', 'command_file': str(files / 'motion.csv')},
     }
     with OperatedGraph(files, extra=(WatchNode,), **overrides) as graph:
         graph.enable()
@@ -106,7 +106,7 @@ def test_the_bag_of_an_alarm_begins_before_the_change_and_can_be_explained(watch
 
 def test_an_adopted_plant_is_the_one_that_is_compared_from_then_on(watched, files):
     graph, _ = watched
-    graph.set('console', source='none')
+    graph.set('master', source='none')
     graph.advance(1.0)
     status, out, errors = graph.run('operate', 'adopt', str(files / 'described.yaml'), '--json')
     assert status == 0, out + errors

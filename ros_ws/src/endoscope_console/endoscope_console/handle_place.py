@@ -91,7 +91,7 @@ class HandlePlace:
         try:
             await self._set_source_back(source)
         except GraphError as error:
-            self._graph.log(f'console.source {source}', '', '', False, str(error))
+            self._graph.log(f'master.source {source}', '', '', False, str(error))
         self._graph.ask_for_settings(time.monotonic_ns())
 
     async def _set_source_back(self, source: str) -> None:

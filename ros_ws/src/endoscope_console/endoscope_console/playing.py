@@ -121,7 +121,7 @@ class Playing:
                 before = before | {'source': FOLLOW_THE_HANDLE}
                 await self._ask(partial(self._place.set_master, **before))
             except GraphError as error:
-                self._graph.log(f'console.source {FOLLOW_THE_HANDLE}', '', '', False, str(error))
+                self._graph.log(f'master.source {FOLLOW_THE_HANDLE}', '', '', False, str(error))
             self._graph.ask_for_settings(time.monotonic_ns())
 
     async def motion(self, motion: AskedMotion, consent: Consent, begins: Begins) -> None:

@@ -14,13 +14,11 @@ from endoscope_devices.dynamixel.control_table import (
     TABLE_SIZE,
 )
 from endoscope_devices.dynamixel.packet import (
-    BROADCAST_ID,
     STATUS,
     Instruction,
     PacketReader,
     crc16,
     encode,
-    split_fast_answer,
 )
 from endoscope_devices.dynamixel.packet_handler import sync_write_request
 
@@ -73,22 +71,6 @@ def test_what_is_sent_in_any_pieces_is_what_is_read(device, instruction, paramet
         packets += reader.feed(stream[start : start + piece])
     assert [p[:3] for p in packets] == [(device, instruction, parameters)] * 2
     assert reader.wrong_crc == 0
-
-
-def test_an_answer_to_a_fast_sync_read_is_taken_apart_and_each_part_checked():
-    body = b''
-    length = 1 + 3 * 8
-    for device in (3, 7, 4):
-        body += bytes((0x80 if device == 7 else 0, device)) + bytes((device, 0xFF, 0xFF, 0xFD))
-        head = bytes((0xFF, 0xFF, 0xFD, 0, BROADCAST_ID, length, 0, STATUS))
-        body += crc16(head + body).to_bytes(2, 'little')
-    raw = head + body
-    (packet,) = PacketReader().feed(raw)
-    parts = split_fast_answer(packet, 4)
-    assert {device: error for device, (error, _) in parts.items()} == {3: 0, 7: 0x80, 4: 0}
-    assert parts[7][1] == bytes((7, 0xFF, 0xFF, 0xFD))
-    assert split_fast_answer(packet._replace(parameters=packet.parameters[::-1]), 4) == {}
-    assert split_fast_answer(packet, 5) == {}
 
 
 def test_values_have_their_sign():

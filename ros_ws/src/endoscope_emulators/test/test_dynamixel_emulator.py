@@ -59,8 +59,7 @@ def test_the_sdk_reads_and_writes_registers(port):
     assert abs(position - 2100) <= 1
 
 
-@pytest.mark.parametrize('fast', [False, True])
-def test_the_sdk_reads_and_writes_both_at_once(port, fast):
+def test_the_sdk_reads_and_writes_both_at_once(port):
     writer = GroupSyncWrite(port, sdk, 116, 4)
     for device, goal in ((1, 2000), (2, 2100)):
         assert writer.addParam(device, list(goal.to_bytes(4, 'little')))
@@ -68,7 +67,7 @@ def test_the_sdk_reads_and_writes_both_at_once(port, fast):
     reader = GroupSyncRead(port, sdk, 116, 4)
     for device in (1, 2):
         assert reader.addParam(device)
-    assert (reader.fastSyncRead() if fast else reader.txRxPacket()) == COMM_SUCCESS
+    assert reader.txRxPacket() == COMM_SUCCESS
     assert [reader.getData(device, 116, 4) for device in (1, 2)] == [2000, 2100]
 
 

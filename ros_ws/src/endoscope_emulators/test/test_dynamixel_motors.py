@@ -194,10 +194,9 @@ def test_an_adapter_that_goes_away_under_the_doctor_is_named(port_that_goes_away
     assert 'the adapter is gone' in advice
 
 
-@pytest.mark.parametrize('fast', [False, True])
-def test_four_and_a_half_megabaud_and_fast_sync_read(fast):
+def test_four_and_a_half_megabaud():
     with EmulatorProcess(baud=4_500_000) as emulator:
-        motors = opened(BusSettings(emulator.port, 4_500_000, fast=fast), MOUNTS)
+        motors = opened(BusSettings(emulator.port, 4_500_000), MOUNTS)
         try:
             drive(motors, (0.0, 0.0), lambda: motors.bus.figures.readings > 50)
         finally:

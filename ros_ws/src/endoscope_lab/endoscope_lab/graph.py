@@ -165,7 +165,7 @@ def least_cores(
 def _recorded() -> Iterator[Mapping[str, Mapping[str, object]]]:
     """Parameters of a graph that moves and is recorded to a folder that is thrown away."""
     with tempfile.TemporaryDirectory() as folder:
-        yield {'recorder': {'bag': f'{folder}/bag'}, 'console': _PLAYING}
+        yield {'recorder': {'bag': f'{folder}/bag'}, 'master': _PLAYING}
 
 
 @contextmanager
@@ -300,7 +300,7 @@ def processes_are_carried(rate: int, seconds: float) -> bool:
         Operator(domain) as operator,
     ):
         of_node: dict[str, dict[str, object]] = {
-            'console': {'source': 'motion'},
+            'master': {'source': 'motion'},
             'recorder': {'bag': f'{folder}/bag'},
         }
         for node in NODES:

@@ -6,8 +6,8 @@ WIRES = ('wire_x_pos', 'wire_x_neg', 'wire_y_pos', 'wire_y_neg')
 
 # Node names of the master and of the simulation clock, by which their parameters, permissions and
 # diagnostics go. All other nodes are named as their modules.
-MASTER_NODE = 'console'
-CLOCK_NODE = 'conductor'
+MASTER_NODE = 'master'
+CLOCK_NODE = 'simulation_clock'
 
 MASTER_MEASURED = 'master/measured_js'
 MASTER_CLUTCH = 'master/clutch'
@@ -49,7 +49,7 @@ LOAD_CELLS_TARE = 'load_cells/tare'
 REGISTER_STRAIGHT = 'em_tracker/register_straight'
 MOTOR_REBOOT = 'motor/reboot'
 
-# What `conductor: lock-step` says on /diagnostics: simulated seconds in a real one.
+# What `simulation_clock: lock-step` says on /diagnostics: simulated seconds in a real one.
 FACTOR = 'real-time factor'
 # What `supervisor: operating state` says there of a refused command: why, by a code of
 # :class:`endoscope_core.safety.Answer` and in words, and when; and which streams never came.

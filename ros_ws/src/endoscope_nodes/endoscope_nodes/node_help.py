@@ -18,7 +18,7 @@ _TO_ONE_OF_MANY = """\
 A parameter behind -p goes to every node that has it. For one node alone, give --params-file a file
 such as
 
-    /**/console:
+    /**/master:
       ros__parameters: {source: master}
 """
 _END = """\

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from endoscope_core.exit_status import exit_status
-from endoscope_nodes import names
 from endoscope_nodes.runtime.stop_signals import end_when_asked
 
 REAL_TIME = '--real-time'
@@ -25,12 +24,11 @@ class Program:
     purpose: str  # a sentence or two
     composed: tuple[str, ...] = ()  # nodes that it runs; empty for a single one
     options: tuple[tuple[str, str], ...] = ()  # words of its own, and what each does
-    node: str = ''  # node name, where that is another
 
     @property
     def nodes(self) -> tuple[str, ...]:
         """Node names of what it runs."""
-        return self.composed or (self.node or self.name,)
+        return self.composed or (self.name,)
 
     def __call__(self, argv: Sequence[str] | None = None) -> int:
         """Run it with a command line without its name (default: `sys.argv`); the exit status."""
@@ -65,23 +63,6 @@ class Program:
         return run_nodes([found])
 
 
-@dataclass(frozen=True)
-class OldName:
-    """A name by which a program can still be started, for one version."""
-
-    name: str
-    program: Program
-
-    def __call__(self, argv: Sequence[str] | None = None) -> int:
-        """Run the program, and say on stderr what it is called."""
-        print(
-            f'{self.name}: this program is called {self.program.name}; the name {self.name} goes '
-            'with the next version',
-            file=sys.stderr,
-        )
-        return self.program(argv)
-
-
 def words_for_nobody(argv: Sequence[str]) -> list[str]:
     """Return the words of a command line that are not ROS arguments."""
     # Those stand between --ros-args and -- or the end, as often as one likes; see
@@ -103,7 +84,6 @@ master = Program(
     'nodes.master:MasterNode',
     'Turns the motion of the handle into commands while the clutch is held, or plays a motion or '
     'a file.',
-    node=names.MASTER_NODE,
 )
 motor_driver = Program(
     'motor_driver',
@@ -170,10 +150,7 @@ simulation_clock = Program(
     'simulation_clock',
     'nodes.simulation_clock:SelfStartingClock',
     'Makes simulated time, a millisecond at a time, as fast as the graph can follow.',
-    node=names.CLOCK_NODE,
 )
-console = OldName('console', master)
-conductor = OldName('conductor', simulation_clock)
 
 _COMPOSED = (
     *(motor_driver, load_cells, em_tracker, supervisor),

@@ -48,7 +48,7 @@ def link(number):
 @pytest.fixture
 def links():
     arguments = ['--ros-args', '-p', 'use_sim_time:=true', '-p', 'tick_rate:=500']
-    waits = {'conductor': {'wait_for': [MOTOR_MEASURED]}}
+    waits = {'simulation_clock': {'wait_for': [MOTOR_MEASURED]}}
     with Runtime(arguments, Context(), 229, waits) as runtime:
         links = [runtime.add(link(number)) for number in range(HOPS)]
         clock = runtime.add(SimulationClockNode)

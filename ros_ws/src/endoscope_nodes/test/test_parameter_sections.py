@@ -44,7 +44,7 @@ def test_a_misspelt_node_is_refused_wherever_it_might_be(check, section):
         check(f'{section}:\n  ros__parameters: {{autostart: false}}\n')
 
 
-@pytest.mark.parametrize('section', ['recorder', '/console'])
+@pytest.mark.parametrize('section', ['recorder', '/master'])
 def test_a_node_without_its_namespace_is_refused(check, section):
     name = section.strip('/')
     with pytest.raises(ParameterError, match=f"write '/endoscope/{name}' or '/\\*\\*/{name}'"):

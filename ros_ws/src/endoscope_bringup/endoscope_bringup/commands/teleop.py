@@ -25,7 +25,7 @@ and release: then the slave moves from one to the other, two keys move both join
 still stops it, 0.15 s after a repeat and 0.7 s after a press. After a stop that was no release the
 key has to be let go of and pressed again.
 
-The slave follows while the graph is ENABLED and `console.source` is `master`, which is set with
+The slave follows while the graph is ENABLED and `master.source` is `master`, which is set with
 your consent and set back at the end. Whatever ends this program, the clutch is released first: Q,
 Ctrl-C, Ctrl-Z, SIGTERM, a closed terminal; after a kill -9 the graph stops by itself, since the
 handle is silent.
@@ -42,7 +42,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
-        '--take', action='store_true', help='set console.source to master without asking'
+        '--take', action='store_true', help='set master.source to master without asking'
     )
     parser.add_argument(
         '--speed',

@@ -67,14 +67,14 @@ def status_of(client: GraphClient, patience_s: float) -> tuple[tuple[str, ...], 
         'compensator': _of_json(client.compensator),
         'calibration': _of_json(client.calibration),
         'recorder': {'bag': bag, 'message': recorder.message if recorder else ''},
-        'console_source': source,
+        'master_source': source,
     }
     lines = (
         *_entry('state', [_state(client)]),
         *_entry('session', [(client.session or 'none') if client.graph_ns else _NOT_HEARD]),
         *_entry('time', [_time(health)]),
         *_entry('rig', [kinds[-1] if kinds else _NOT_HEARD, *_limits(health)]),
-        *_entry('console', [_master(source, master)]),
+        *_entry('master', [_master(source, master)]),
         *_entry('compensator', [client.compensator.message if client.compensator else _NOT_HEARD]),
         *_entry(
             'calibration',

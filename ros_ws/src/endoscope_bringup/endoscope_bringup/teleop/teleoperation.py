@@ -82,13 +82,13 @@ def _check_consent(source: str, taken: bool) -> None:
     if source == FOLLOW_THE_HANDLE or taken:
         return
     plays = '; what it plays ends' if source in PLAYS else ''
-    print(f'console.source is {source}: the master follows no handle.')
+    print(f'master.source is {source}: the master follows no handle.')
     try:
         answer = input(f'Set it to master until teleop ends{plays}? [y/N] ')
     except EOFError:
         answer = ''
     if answer.strip().lower() not in ('y', 'yes'):
-        raise GraphError(f'console.source stays {source}: nothing would follow the keys')
+        raise GraphError(f'master.source stays {source}: nothing would follow the keys')
 
 
 def _wait_for_the_handles_place(client: GraphClient) -> None:
@@ -112,7 +112,7 @@ def _give_back(
     source = before.get('source')
     if source in PLAYS and client.state == 'ENABLED':
         client.ask('pause', patience_s)
-        terminal.say(f'paused: console.source {source} starts again when you resume')
+        terminal.say(f'paused: master.source {source} starts again when you resume')
     set_parameters(client, MASTER_NODE, before, patience_s)
 
 
@@ -281,7 +281,7 @@ class _Teleoperation:
         if master is not None and master.received_ns > self._taken_ns + 2 * _SUPERVISED_NS:
             source = master.values.get('source', FOLLOW_THE_HANDLE)
             if source != FOLLOW_THE_HANDLE:
-                return f'console.source is {source}'
+                return f'master.source is {source}'
         if self._home is None and self._client.underway is not None:
             return 'a calibration or a way home has the slave'
         return ''

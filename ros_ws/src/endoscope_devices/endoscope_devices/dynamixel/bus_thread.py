@@ -256,12 +256,12 @@ class BusThread:
         raise BusError('the servos restart as asked')
 
     def _cycle(self, bus: PacketHandler) -> None:
-        request = sync_read_request(BLOCK_ADDRESS, BLOCK_SIZE, self._ids, self.settings.fast)
+        request = sync_read_request(BLOCK_ADDRESS, BLOCK_SIZE, self._ids)
         goal = self._goal_now()
         if goal is not None:
             request = self._goal_request(goal) + request
         asked_ns = time.monotonic_ns()
-        replies = bus.transact(request, self._ids, BLOCK_SIZE, self.settings.fast)
+        replies = bus.transact(request, self._ids, BLOCK_SIZE)
         received_ns = time.monotonic_ns()
         self.figures.cycles += 1
         doubt = self._take(replies, asked_ns, received_ns)

@@ -32,7 +32,6 @@ class Instruction(IntEnum):
     REBOOT = 0x08
     SYNC_READ = 0x82
     SYNC_WRITE = 0x83
-    FAST_SYNC_READ = 0x8A
 
 
 def _crc_table() -> tuple[int, ...]:
@@ -75,8 +74,7 @@ class Packet(NamedTuple):
 
     device: int
     instruction: int  # ``STATUS`` for an answer
-    # Unstuffed, but as they came in the answer to a fast sync read, which is never stuffed.
-    parameters: bytes
+    parameters: bytes  # unstuffed
     size: int  # bytes on the wire
 
 
@@ -121,46 +119,15 @@ class PacketReader:
                 return None
             raw = bytes(buffer[:size])
             body = raw[PREFIX_SIZE:-CRC_SIZE]
-            bare = raw[4] == BROADCAST_ID and body[0] == STATUS
-            if crc16(raw[:-CRC_SIZE]) != int.from_bytes(raw[-CRC_SIZE:], 'little') or not (
-                bare or _is_stuffed(body)
-            ):
+            right = crc16(raw[:-CRC_SIZE]) == int.from_bytes(raw[-CRC_SIZE:], 'little')
+            if not right or body.count(_BARE) != body.count(_STUFFED):
                 self.wrong_crc += 1
                 self._skip(1)
                 continue
             del buffer[:size]
-            parameters = body[1:] if bare else body[1:].replace(_STUFFED, _BARE)
-            return Packet(raw[4], body[0], parameters, size)
+            return Packet(raw[4], body[0], body[1:].replace(_STUFFED, _BARE), size)
 
     def _skip(self, count: int) -> None:
         if count > 0:
             self.skipped += count
             del self._buffer[:count]
-
-
-def _is_stuffed(body: bytes) -> bool:
-    return body.count(_BARE) == body.count(_STUFFED)
-
-
-def split_fast_answer(packet: Packet, size: int) -> dict[int, tuple[int, bytes]]:
-    """Error byte and `size` bytes of data by id in a fast sync read's answer; empty if it is none.
-
-    Every servo adds error, id, data and the CRC of all that came before (e-manual 'Fast Sync
-    Read'), so that each part is checked by itself.
-    """
-    body = packet.parameters
-    step = 2 + size + CRC_SIZE
-    if (len(body) + CRC_SIZE) % step or packet.instruction != STATUS:
-        return {}
-    length = len(body) + 1 + CRC_SIZE
-    so_far = HEADER + bytes((packet.device, length & 0xFF, length >> 8, STATUS))
-    parts = {}
-    for start in range(0, len(body), step):
-        block = body[start : start + 2 + size]
-        so_far += block
-        crc = body[start + 2 + size : start + step]
-        if crc and crc16(so_far).to_bytes(CRC_SIZE, 'little') != crc:
-            return {}
-        so_far += crc
-        parts[block[1]] = (block[0], block[2:])
-    return parts

@@ -28,7 +28,6 @@ from endoscope_devices.dynamixel.packet import (
     Packet,
     PacketReader,
     encode,
-    split_fast_answer,
 )
 from endoscope_devices.dynamixel.serial_port import BusPort, byte_time, latency_timer
 
@@ -50,16 +49,15 @@ class Reply(NamedTuple):
 
 
 class AnswerCollector:
-    """Matches packets with the open request by kind, id, order and length; `fast`: all in one."""
+    """Matches packets with the open request by kind, id, order and length."""
 
-    def __init__(self, devices: Sequence[int], size: int, fast: bool = False) -> None:
+    def __init__(self, devices: Sequence[int], size: int) -> None:
         self.replies: dict[int, Reply] = {}
         # Valid packets that answer no open question: late, repeated, or of another servo.
         self.stray = 0
         self.reader = PacketReader()
         self._devices = tuple(devices)
         self._size = size  # data bytes of each answer
-        self._fast = fast
 
     @property
     def complete(self) -> bool:
@@ -77,11 +75,6 @@ class AnswerCollector:
 
     def _reply(self, packet: Packet) -> dict[int, Reply] | None:
         if packet.instruction != STATUS or self.complete:
-            return None
-        if self._fast and packet.device == BROADCAST_ID:
-            parts = split_fast_answer(packet, self._size)
-            if tuple(parts) == self._devices:
-                return {device: Reply(*part) for device, part in parts.items()}
             return None
         expected = packet.device == self._devices[len(self.replies)]
         if not expected or not packet.parameters:
@@ -203,21 +196,19 @@ class PacketHandler:
         request: bytes,
         devices: Sequence[int],
         size: int,
-        fast: bool = False,
         margin: float = 0.0,
     ) -> dict[int, Reply]:
         """Send one packet or more, and collect the answers of some servos to the last, by id.
 
-        They answer in the order of `devices` with `size` data bytes each, in one packet if `fast`
-        (fast sync read), and have `margin` s in addition. Answers that did not come are missing.
-        OSError when the adapter is gone.
+        They answer in the order of `devices` with `size` data bytes each, and have `margin` s in
+        addition. Answers that did not come are missing. OSError when the adapter is gone.
         """
         port = self.port
         port.clearPort()
         port.send(request)
         deadline = time.monotonic() + self.time_out(len(request), [size] * len(devices)) + margin
         self.counts.requests += len(devices)
-        collector = AnswerCollector(devices, size, fast)
+        collector = AnswerCollector(devices, size)
         in_time = True
         while in_time and not collector.complete:
             in_time = time.monotonic() < deadline
@@ -250,10 +241,9 @@ class PacketHandler:
         return found
 
 
-def sync_read_request(address: int, size: int, devices: Sequence[int], fast: bool = False) -> bytes:
+def sync_read_request(address: int, size: int, devices: Sequence[int]) -> bytes:
     """Bytes that make several servos answer, in order of `devices`, with the same registers."""
-    instruction = Instruction.FAST_SYNC_READ if fast else Instruction.SYNC_READ
-    return encode(BROADCAST_ID, instruction, _words(address, size) + bytes(devices))
+    return encode(BROADCAST_ID, Instruction.SYNC_READ, _words(address, size) + bytes(devices))
 
 
 def sync_write_request(address: int, size: int, data: Mapping[int, bytes]) -> bytes:

@@ -46,7 +46,6 @@ class BusSettings:
     goal_timeout: float = 0.1
     # Silence of a servo in s after which motion is refused until it is enabled again.
     fault_after: float = 0.05
-    fast: bool = False  # whether to use fast sync read (firmware 45 and newer)
 
     def __post_init__(self) -> None:
         for register, counts in (

@@ -20,13 +20,10 @@ from endoscope_devices.dynamixel import control_table as table
 from endoscope_devices.dynamixel.control_table import BAUD_CODES, RETURN_DELAY_UNIT
 from endoscope_devices.dynamixel.packet import (
     BROADCAST_ID,
-    CRC_SIZE,
-    HEADER,
     STATUS,
     Instruction,
     Packet,
     PacketReader,
-    crc16,
     encode,
 )
 from endoscope_devices.dynamixel.serial_port import byte_time
@@ -225,7 +222,7 @@ class EmulatedBus(ClosedOnExit):
         self, packet: Packet, hearing: Sequence[EmulatedServo], now: float
     ) -> Iterator[tuple[EmulatedServo, bytes]]:
         words = packet.parameters
-        if packet.instruction in (Instruction.SYNC_READ, Instruction.FAST_SYNC_READ):
+        if packet.instruction == Instruction.SYNC_READ:
             yield from self._sync_read(packet, hearing)
         elif packet.instruction == Instruction.SYNC_WRITE:
             size = int.from_bytes(words[2:4], 'little')
@@ -273,25 +270,13 @@ class EmulatedBus(ClosedOnExit):
         words = packet.parameters
         address, size = (int.from_bytes(words[k : k + 2], 'little') for k in (0, 2))
         here = {servo.value(table.ID): servo for servo in hearing}
-        fast = b''
-        last = None
         for device in words[4:]:
             if device not in here:
                 # Each servo answers after the one before it in the list.
                 return
-            servo = last = here[device]
+            servo = here[device]
             error, data = servo.read(address, size)
-            if packet.instruction == Instruction.SYNC_READ:
-                yield servo, _status(servo, error, data)
-                continue
-            if not fast:
-                length = 1 + len(words[4:]) * (2 + size + CRC_SIZE)
-                fast = HEADER + bytes((BROADCAST_ID, length & 0xFF, length >> 8, STATUS))
-            block = bytes((error | servo.alert(), device)) + data.ljust(size, b'\0')
-            fast += block
-            fast += crc16(fast).to_bytes(CRC_SIZE, 'little')
-        if fast and last is not None:
-            yield last, fast
+            yield servo, _status(servo, error, data)
 
 
 _ALWAYS_ANSWERED = (Instruction.PING, Instruction.READ)

@@ -107,7 +107,7 @@ def _stop_weighing(rig: MotorRig) -> None:
 
 
 def _let_go(rig: MotorRig) -> None:
-    rig.node('console').set_parameters([Parameter('source', value='none')])
+    rig.node('master').set_parameters([Parameter('source', value='none')])
 
 
 MOTOR_FAULTS: dict[str, MotorFault] = {
@@ -132,9 +132,9 @@ MOTOR_FAULTS: dict[str, MotorFault] = {
     'clutch released': MotorFault('operator lets go of the clutch', _let_go, 'ENABLED'),
     'console killed': MotorFault(
         'console killed (SIGKILL)',
-        lambda rig: rig.kill('console'),
+        lambda rig: rig.kill('master'),
         cause='slave/servo_jp ended while the clutch was held',
-        apart=('console',),
+        apart=('master',),
     ),
     'motor driver killed': MotorFault(
         'motor driver killed (SIGKILL)',

@@ -44,7 +44,7 @@ _NODES: dict[str, type] = {
     'motor_driver': MotorDriverNode,
     'supervisor': SupervisorNode,
     'compensator': CompensatorNode,
-    'console': MasterNode,
+    'master': MasterNode,
 }
 
 
@@ -105,7 +105,7 @@ class MotorRig(ClosedOnExit):
             'motor_driver': driver,
             'supervisor': {},
             'compensator': {'mode': 'none'},
-            'console': {'source': 'motion'},
+            'master': {'source': 'motion'},
             'recorder': {'bag': str(self.bag)},
         }
         stream = {} if patience is None else {'timeouts': {'stream': patience}}

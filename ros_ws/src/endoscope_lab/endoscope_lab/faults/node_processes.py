@@ -19,7 +19,7 @@ NODES = (
     'compensator',
     'controller',
     'calibration',
-    'console',
+    'master',
     'recorder',
 )
 GRAPH = 'graph'

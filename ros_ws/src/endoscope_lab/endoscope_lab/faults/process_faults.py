@@ -170,11 +170,11 @@ def _stall(name: str, seconds: float, rig: ProcessRig) -> None:
 
 
 def _stall_with_clutch(rig: ProcessRig) -> None:
-    rig.processes.stall('console')
+    rig.processes.stall('master')
     for held in (False, True):
         rig.operator.serve(0.25)
         rig.operator.press(held)
-    rig.processes.resume('console')
+    rig.processes.resume('master')
 
 
 def _press_while_the_driver_stalls(rig: ProcessRig) -> None:
@@ -308,10 +308,10 @@ PROCESS_FAULTS: Mapping[str, ProcessFault] = (
             lambda rig: rig.kill('supervisor'), 'motion', 'supervisor'
         ),
         'console killed, master plays': ProcessFault(
-            lambda rig: rig.kill('console'), 'motion', 'console'
+            lambda rig: rig.kill('master'), 'motion', 'master'
         ),
         'console stalled for 2 s, master plays': ProcessFault(
-            partial(_stall, 'console', 2.0), 'motion'
+            partial(_stall, 'master', 2.0), 'motion'
         ),
     }
 )

@@ -40,7 +40,7 @@ class ProcessRig(ClosedOnExit):
     def begin(self, source: str) -> None:
         """Have the graph run with a source of its motion; see `ProcessFault`."""
         of_master = {'outside': 'none'}.get(source, source)
-        holder = GRAPH if GRAPH in self.names else 'console'
+        holder = GRAPH if GRAPH in self.names else 'master'
         if of_master != self._source or source == 'motion':
             if holder in self.processes.running:
                 self.end(holder)
@@ -66,8 +66,8 @@ class ProcessRig(ClosedOnExit):
     def start(self, name: str) -> None:
         first = 'motor_driver' if name == GRAPH else name
         parameters: dict[str, dict[str, object]] = {first: {'tick_rate': self.rate}}
-        if name in ('console', GRAPH):
-            parameters.setdefault('console', {})['source'] = self._source
+        if name in ('master', GRAPH):
+            parameters.setdefault('master', {})['source'] = self._source
         if name in ('controller', GRAPH):
             # What feedback adds to a motion would hide what a fault adds.
             parameters.setdefault('controller', {})['active'] = False

@@ -41,7 +41,7 @@ def _overrides(folder: str, watched: bool, seconds: float) -> dict[str, dict[str
     return {
         'watch': {'active': watched},
         'recorder': {'bag': f'{folder}/bag', 'autostart': False},
-        'console': {'source': 'file', 'command_file': str(motion)},
+        'master': {'source': 'file', 'command_file': str(motion)},
     }
 
 

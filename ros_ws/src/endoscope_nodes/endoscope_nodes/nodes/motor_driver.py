@@ -270,7 +270,6 @@ def build_motors(p: DynamixelParameters, goal_timeout: float) -> DynamixelMotors
             rate=p.bus_rate,
             goal_timeout=goal_timeout,
             fault_after=p.fault_after,
-            fast=p.fast_sync_read,
         )
     except DeviceError as error:
         raise ParameterError(f'motor_driver: {error}') from error

@@ -122,9 +122,6 @@ class DynamixelParameters:
         low=0.005,
         high=1.0,
     )
-    fast_sync_read: bool = parameter(
-        False, 'one answer for all servos, which firmware 45 and newer can give'
-    )
 
 
 @dataclass(frozen=True)
