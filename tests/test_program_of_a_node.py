@@ -137,7 +137,7 @@ def test_the_graph_says_what_it_was_given_when_it_is_ready_and_what_to_do(tmp_pa
     process.communicate(timeout=PATIENCE_S)
     assert [line for line in told if ' with ' in line] == [
         'left.motor_driver]: with tick_rate:=200',
-        'left.console]: with scale:=0.5',
+        'left.master]: with scale:=0.5',
         'left.recorder]: with autostart:=false',
     ]
     assert told[-1] == (
@@ -236,7 +236,7 @@ def test_a_node_is_healthy_while_it_speaks(tmp_path):
         process.communicate()
     assert (heard.returncode, heard.stderr) == (0, '')
     assert silent.returncode == 1
-    assert silent.stderr == 'healthcheck: console has been silent for 5 s\n'
+    assert silent.stderr == 'healthcheck: master has been silent for 5 s\n'
 
 
 def healthcheck(node, environment):
