@@ -221,7 +221,7 @@ def test_a_program_that_is_killed_moves_nothing_on_and_is_in_no_way(graph, motio
     save_plant(PlantDescription(), tmp_path / 'plant.yaml')
     graph.command('disable')
     graph.advance(0.5)
-    graph.set('console', source='master')
+    graph.set('master', source='master')
     before = parameters(graph)
     graph.goals.clear()
     words = ['--plant', str(tmp_path / 'plant.yaml'), '--out', str(tmp_path / 'out')]
@@ -241,11 +241,11 @@ def test_a_program_that_is_killed_moves_nothing_on_and_is_in_no_way(graph, motio
         program.communicate()
     assert graph.state == 'ENABLED'
     changed = dict(set(parameters(graph).items()) - set(before.items()))
-    assert {'compensator.mode', 'controller.active', 'console.source'} <= set(changed)
+    assert {'compensator.mode', 'controller.active', 'master.source'} <= set(changed)
     graph.command('disable')
     graph.advance(0.2)
     assert parameters(graph) == before
-    graph.set('console', source='none')
+    graph.set('master', source='none')
     assert stands_still(graph)
     log = json.loads((tmp_path / 'out' / 'log.json').read_text())
     assert [each['recorded'] for each in log['rounds']] == [False]

@@ -289,7 +289,7 @@ def test_topics_are_listed_with_senders_readers_and_what_is_missing(graph):
     rows = {line.split()[0]: line for line in out.splitlines()[1:]}
     assert 'sensor_msgs/msg/JointState' in rows['motor/servo_jp']
     assert 'compensator' in rows['motor/servo_jp']
-    assert rows['slave/servo_jp'].endswith('console does not send it now')
+    assert rows['slave/servo_jp'].endswith('master does not send it now')
     assert rows['master/measured_js'].endswith('no sender outside the graph')
     status, out, _ = graph.run('topics', '--json')
     rows = {row['topic']: row for row in json.loads(out)}
