@@ -83,7 +83,7 @@ def parameters(graph):
     """What an investigation sets in nodes that it does not ask to stay so."""
     return {
         f'{node}.{name}': parameter.value
-        for node in ('compensator', 'controller', 'console')
+        for node in ('compensator', 'controller', 'master')
         for name, parameter in graph.nodes[node].get_parameters_by_prefix('').items()
         if not isinstance(parameter.value, list)
     }
