@@ -194,7 +194,8 @@ def ready(rig, page) -> None:
     answer = page.order('claim', take=True)
     assert answer['ok'], (answer, rig.server.lines)
     if rig.client.state != 'ENABLED':
-        answer = page.order('state', command='enable')
+        command = 'resume' if rig.client.state == 'PAUSED' else 'enable'
+        answer = page.order('state', command=command)
         assert answer['ok'], answer
     rig.until(lambda: page.dead_man == 'READY', 'READY')
 

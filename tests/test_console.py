@@ -210,8 +210,11 @@ def test_an_operator_takes_over_and_has_to_grip_anew(rig):
         assert not refused['ok']
         assert first.you in refused['why']
         second.does(pressed=True, x=0.5)
-        refused = second.order('state', command='disable')
+        refused = second.order('state', command='home')
         assert 'operates' in refused['why']
+        assert second.order('state', command='pause')['ok'], 'halting is for every operator'
+        stopped(rig, first)
+        rig.until(lambda: rig.client.state == 'PAUSED')
         assert second.order('claim', take=True)['ok']
         rig.until(lambda: first.lost)
         assert second.you in first.lost[0]['by']
@@ -240,6 +243,16 @@ def test_a_viewer_looks_on(rig):
         assert not any(one['operator'] == page.you for one in rig.orders), 'it fills no recording'
         rig.until(lambda: page.pictures > 3)
         assert rig.client.state == 'DISABLED'
+
+
+def test_what_nobody_operates_any_more_is_paused_with_an_alarm(rig):
+    with rig.page() as watching:
+        with rig.page() as page:
+            ready(rig, page)
+        unattended = 'enabled, and nobody operates: paused after 5 s'
+        rig.until(lambda: unattended in [a['text'] for a in watching.state['alarms']], 'the alarm')
+        rig.until(lambda: watching.state['operating_state'] == 'PAUSED', 'the pause')
+        assert watching.order('acknowledge', alarm='unattended')['ok']
 
 
 def test_nothing_moves_by_itself_under_a_hand_that_holds(rig):

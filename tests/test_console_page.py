@@ -316,7 +316,9 @@ def test_of_two_pages_the_one_that_takes_over_has_the_controls(console, browser,
     enable(page)
     with console.page(browser) as other:
         expect(other.locator('#claim')).to_have_text('Take over …')
-        expect(other.locator('#pause')).to_be_disabled()
+        other.click('#pause')
+        shows(page, 'state', 'PAUSED')
+        hold_enable(page)
         other.click('#claim')
         expect(other.locator('#take')).to_be_visible()
         other.get_by_role('button', name='Leave it').click()

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 DEFAULT_PORT = 8642
+SLOWEST_HZ, RATE_HZ = 10, 30
 DEFAULT_VIEWERS_PORT = 8765
 """Where viewers look for a server first."""
 
@@ -92,6 +93,14 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         metavar='NAME=VALUE',
         help='a parameter of the topic joy, by the names of teleop_twist_joy: enable_button=5, '
         'axis_angular.bend_x=0, pause_button=8, ...',
+    )
+    parser.add_argument(
+        '--rate',
+        type=int,
+        choices=range(SLOWEST_HZ, RATE_HZ + 1),
+        default=RATE_HZ,
+        metavar='HZ',
+        help='pictures a second; %(default)d by default, 10 where the machine is too busy for that',
     )
     parser.add_argument(
         '--namespace', default='endoscope', help='of the graph (default: %(default)s)'

@@ -22,9 +22,9 @@ from endoscope_console.investigations import AskedMotion, Investigations
 from endoscope_console.investigations import Consent as AskOperator
 from endoscope_console.playing import Holder, Playing
 from endoscope_console.teleop.frames import InputFrame
-from endoscope_console.teleop.lease import Lease
+from endoscope_console.teleop.lease import Attendance, Lease
 from endoscope_console.teleop.operator import DeadManState, Reason
-from endoscope_core.choices import PHYSICAL
+from endoscope_core.choices import FOLLOW_THE_HANDLE, PHYSICAL
 from endoscope_core.errors import EndoscopeError, NotPlayedError
 from endoscope_nodes.client.plant_adoption import RefusedAdoptionError, plant_text
 from endoscope_nodes.names import RECORDER_START, RECORDER_STOP
@@ -56,6 +56,7 @@ class Operations:
     alarms: Alarms
     counts: Counter[str]  # of refusals
     lease: Lease = field(default_factory=Lease)  # of the one operator
+    attendance: Attendance = field(default_factory=Attendance)  # of the session that is open
 
     def __post_init__(self) -> None:
         self._pool = ThreadPoolExecutor(_WAITING_ORDERS, thread_name_prefix='order')
@@ -104,7 +105,19 @@ class Operations:
             self._holder.moves = ''
         if self.playing.is_over():
             self.soon(self.playing.end(self._holder))
+        client = self.graph.client
+        session = client.session if client.state == 'ENABLED' else ''
+        if self.attendance.turn(now_ns, session, not session or self._is_attended()):
+            client.order('pause')
+            self.graph.log('pause', '', '', True, 'nobody operates')
         self._tell_beat()
+
+    def _is_attended(self) -> bool:
+        """Whether anybody operates, here or by another program."""
+        if self.lease.holder:
+            return True
+        other = self.graph.settings.source not in ('', FOLLOW_THE_HANDLE)
+        return not self._place.speaks and (other or bool(self.graph.others_at_the_handle()))
 
     def _tell_beat(self) -> None:
         graph, pictures = self.graph, self.graph.pictures
@@ -150,6 +163,9 @@ class Operations:
         if self.playing.investigates and isinstance(order, _NOT_MEANWHILE):
             raise EndoscopeError('a motion of an investigation is under way')
         if isinstance(order, _NO_LEASE) or client.id == self.lease.holder:
+            return
+        # Ending motion is never wrong, whoever has the controls.
+        if isinstance(order, orders.State) and order.command in orders.HALTS:
             return
         holder = self.holder
         if isinstance(order, _WHERE_NOBODY_OPERATES) and not self.lease.holder:

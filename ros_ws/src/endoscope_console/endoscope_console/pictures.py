@@ -25,7 +25,6 @@ from endoscope_nodes.runtime.qos import profile
 from endoscope_nodes.runtime.streams import JointReader, JointSample, RawSubscription
 from endoscope_nodes.topics import Qos
 
-RATE_HZ = 30
 _STREAMS = (
     (SLAVE_COMMAND, JOINTS, 'wanted', 'rad'),
     (SLAVE_MEASURED, JOINTS, 'measured', 'rad'),

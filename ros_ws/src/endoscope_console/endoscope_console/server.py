@@ -1,4 +1,4 @@
-"""The server between the graph and its pages: files, two sockets, and thirty pictures a second."""
+"""The server between the graph and its pages: files, two sockets, and pictures of the graph."""
 
 import asyncio
 import json
@@ -25,7 +25,7 @@ from endoscope_console.graph_side import GraphSide
 from endoscope_console.joy import JoyHand
 from endoscope_console.operations import Operations
 from endoscope_console.orders import HALTS, MalformedOrderError, State, read_hello, read_order
-from endoscope_console.pictures import RATE_HZ, SIGNALS
+from endoscope_console.pictures import SIGNALS
 from endoscope_console.teleop.frames import POINTS, VERSION, MalformedFrameError, decode_input
 from endoscope_console.teleop.operator import Reason
 from endoscope_console.view import View
@@ -36,8 +36,7 @@ from endoscope_pages import ASSETS
 
 PAGE = Path(__file__).with_name('page')
 _SERVED = ('.css', '.html', '.js', '.svg')
-_PERIOD_NS = round(1e9 / RATE_HZ)
-_UNWATCHED_NS = 3 * _PERIOD_NS
+_UNWATCHED_NS = 100_000_000
 _JOY_S = 0.01
 _JOY_SOUGHT_S = 0.5
 _MALFORMED, _AGAIN, _TOO_LARGE = 1008, 1013, 1009
@@ -55,6 +54,7 @@ class Console:
     tokens: Tokens  # who may do what
     rig: Rig  # whose limits and measures a page is told
     counts: Counter[str]  # of what was refused and dropped
+    rate: int  # of pictures, in Hz
 
     def app(self, admission: Admission) -> Gate:
         """The application, behind the one layer that all passes."""
@@ -140,7 +140,7 @@ class Console:
                 },
                 'section_length': self.rig.instrument.section_length,
                 'points': POINTS,
-                'rate': RATE_HZ,
+                'rate': self.rate,
                 'modes': MODES,
             }
         )
@@ -227,7 +227,7 @@ class Console:
 
     async def make_pictures(self) -> None:
         """Hear the graph, and show it to all, until cancelled."""
-        due_ns = time.monotonic_ns()
+        due_ns, period_ns = time.monotonic_ns(), round(1e9 / self.rate)
         while True:
             now_ns = time.monotonic_ns()
             if not self.operations.beat.alive:
@@ -242,7 +242,7 @@ class Console:
                 if state:
                     client.outbox.put_state(state)
             watched = watching or self.operations.lease.holder
-            due_ns = max(due_ns + (_PERIOD_NS if watched else _UNWATCHED_NS), now_ns)
+            due_ns = max(due_ns + (period_ns if watched else _UNWATCHED_NS), now_ns)
             await asyncio.sleep((due_ns - time.monotonic_ns()) * 1e-9)
 
     async def hear_joy(self) -> None:

@@ -164,10 +164,18 @@ async def _serve(
         operations = Operations(
             graph, beat, clients, explanations, investigations, Alarms(), counts
         )
-        view = View(operations, rig, counts)
+        view = View(operations, rig, counts, args.rate)
         joy = JoyHand(graph, operations, mapping)
         console = Console(
-            graph, operations, clients, view=view, joy=joy, tokens=tokens, rig=rig, counts=counts
+            graph,
+            operations,
+            clients,
+            view=view,
+            joy=joy,
+            tokens=tokens,
+            rig=rig,
+            counts=counts,
+            rate=args.rate,
         )
         address = _address(args, listening)
         admission = Admission(frozenset((address, *args.origin)), args.allow_no_origin)

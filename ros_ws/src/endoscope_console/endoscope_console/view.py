@@ -1,6 +1,7 @@
 """What all pages are told of the graph, the lease and the dead-man, as one object of JSON."""
 
 import math
+import os
 import time
 from collections import Counter
 from typing import Any
@@ -8,8 +9,10 @@ from typing import Any
 import msgspec
 
 from endoscope_console.alarms import Alarm, Level
+from endoscope_console.command import SLOWEST_HZ
 from endoscope_console.graph_side import GraphSide
 from endoscope_console.operations import Operations
+from endoscope_console.teleop.lease import UNATTENDED_NS
 from endoscope_console.teleop.operator import STATE_NS, DeadManState, Reason
 from endoscope_core.rig import Rig
 from endoscope_nodes.client.graph_client import GraphClient
@@ -30,16 +33,19 @@ _TENSE = 0.9
 _LOST_S = 0.5
 _SLOW = 0.9
 _REPEATED_NS = 1_000_000_000
+_OF_A_BUSY_MACHINE = (Reason.SILENT, Reason.LATE, Reason.BLIND, Reason.STALLED)
+_UNATTENDED = f'enabled, and nobody operates: paused after {UNATTENDED_NS / 1e9:.0f} s'
 _encode = msgspec.json.Encoder().encode
 
 
 class View:
     """Puts the state together, and says when there is news."""
 
-    def __init__(self, operations: Operations, rig: Rig, counts: Counter[str]) -> None:
+    def __init__(self, operations: Operations, rig: Rig, counts: Counter[str], rate: int) -> None:
         self._operations = operations
         self._rig = rig
         self._counts = counts
+        self._rate = rate
         self._told: dict[str, Any] = {}
         self._told_ns = 0
 
@@ -195,6 +201,10 @@ class View:
                 client.state == 'FAULT',
                 Alarm('fault', Level.HIGH, client.why or 'the slave is in FAULT', latched=True),
             ),
+            (
+                operations.attendance.lacks,
+                Alarm('unattended', Level.HIGH, _UNATTENDED, latched=True),
+            ),
             (silent and enabled, Alarm('supervisor', Level.HIGH, 'the supervisor is silent')),
             (silent and not enabled, Alarm('graph', Level.LOW, 'no supervisor is heard')),
             (
@@ -202,7 +212,7 @@ class View:
                 Alarm('tracker', Level.MEDIUM, 'the tracker is silent'),
             ),
             (
-                reason in (Reason.SILENT, Reason.LATE, Reason.BLIND, Reason.STALLED),
+                reason in _OF_A_BUSY_MACHINE,
                 Alarm('dead_man', Level.MEDIUM, f'the dead-man was released: {reason}'),
             ),
             (
@@ -221,15 +231,30 @@ class View:
         if tension is not None and tension[0] > _TENSE * self._rig.tension.ceiling:
             text = f'{tension[1]} is above {_TENSE * self._rig.tension.ceiling:.0f} N'
             found.append((True, Alarm('tension', Level.HIGH, text)))
-        if factor is not None and factor < _SLOW:
-            text = f'a busy machine: simulated at {factor:.1f} of real time'
-            found.append((True, Alarm('pace', Level.LOW, text)))
+        load, cores = os.getloadavg()[0], len(os.sched_getaffinity(0))
+        slow = factor is not None and factor < _SLOW
+        if slow or (reason in _OF_A_BUSY_MACHINE and load > cores):
+            text = busy(load, cores, factor if slow else None, self._rate)
+            found.append((True, Alarm('busy', Level.MEDIUM, text)))
         refused = self._refused()
         if refused and enabled:
             found.append((True, Alarm('refused', Level.MEDIUM, refused)))
         if recorder is not None and recorder.level:
             found.append((True, Alarm('recorder', Level.MEDIUM, recorder.message)))
         return [alarm for is_so, alarm in found if is_so]
+
+
+def busy(load: float, cores: int, pace: float | None, rate: int) -> str:
+    """Say by how much a machine is too busy, and what a person can do about it."""
+    by = f'load {load:.0f} on {_counted(cores)}'
+    by += '' if pace is None else f', simulated at {pace:.1f} of real time'
+    how = 'close other pages, viewers and programs'
+    slower = f', or start the console with --rate {SLOWEST_HZ}'
+    return f'the machine is too busy ({by}): {how}{slower if rate > SLOWEST_HZ else ""}'
+
+
+def _counted(cores: int) -> str:
+    return '1 core' if cores == 1 else f'{cores} cores'
 
 
 def _number(said: Health, key: str) -> float | None:

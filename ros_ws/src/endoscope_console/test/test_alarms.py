@@ -3,6 +3,7 @@
 import pytest
 
 from endoscope_console.alarms import Alarm, Alarms, Level
+from endoscope_console.view import busy
 from endoscope_core.errors import EndoscopeError
 
 FAULT = Alarm('fault', Level.HIGH, 'a wire is over its ceiling', latched=True)
@@ -38,3 +39,13 @@ def test_to_have_seen_it_does_not_mend_it():
 def test_there_may_be_nothing_to_acknowledge():
     with pytest.raises(EndoscopeError, match='nothing'):
         Alarms().acknowledge('fault')
+
+
+def test_a_busy_machine_says_by_how_much_and_what_to_do():
+    close = 'close other pages, viewers and programs'
+    slower = 'or start the console with --rate 10'
+    assert busy(17.4, 2, 0.31, 30) == (
+        f'the machine is too busy (load 17 on 2 cores, simulated at 0.3 of real time): {close}, '
+        f'{slower}'
+    )
+    assert busy(3.0, 1, None, 10) == f'the machine is too busy (load 3 on 1 core): {close}'

@@ -3,7 +3,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from endoscope_console.teleop.lease import SILENCE_NS, Claim, Lease
+from endoscope_console.teleop.lease import SILENCE_NS, UNATTENDED_NS, Attendance, Claim, Lease
 
 MS = 1_000_000
 
@@ -58,6 +58,23 @@ def test_a_sign_that_was_stamped_before_another_does_not_shorten_it():
 def test_a_client_has_a_name():
     with pytest.raises(ValueError, match='name'):
         Lease().claim('', True, 0)
+
+
+def test_a_session_that_lost_its_operator_is_paused_and_no_other():
+    attendance = Attendance()
+    assert not attendance.turn(0, 's1', False)
+    assert not attendance.turn(9 * UNATTENDED_NS, 's1', False), 'another program has enabled it'
+    assert not attendance.lacks
+    begin = 10 * UNATTENDED_NS
+    assert not attendance.turn(begin, 's2', True)
+    assert not attendance.turn(begin + UNATTENDED_NS - 1, 's2', False)
+    assert attendance.lacks
+    assert attendance.turn(begin + UNATTENDED_NS, 's2', False)
+    assert attendance.turn(begin + 2 * UNATTENDED_NS, 's2', False), 'it had no effect'
+    assert not attendance.turn(begin + 2 * UNATTENDED_NS, 's2', True)
+    assert not attendance.lacks
+    assert not attendance.turn(begin + 9 * UNATTENDED_NS, '', False)
+    assert not attendance.lacks
 
 
 CLIENTS = st.sampled_from(['c1', 'c2', 'c3'])

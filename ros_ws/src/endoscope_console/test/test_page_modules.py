@@ -85,8 +85,10 @@ def test_frames_are_those_of_the_server(modules):
 class _Page(HTMLParser):
     def __init__(self):
         super().__init__()
-        self.ids, self.words, self.inline, self.buttons = [], [], [], 0
-        self._script = False
+        self.ids, self.words, self.inline = [], [], []
+        self.texts = {'button': set(), 'li': set()}
+        self.describing = set()
+        self._script, self._in = False, ''
 
     def handle_starttag(self, tag, attrs):
         attributes = dict(attrs)
@@ -94,14 +96,21 @@ class _Page(HTMLParser):
         self.inline += [name for name in attributes if name == 'style' or name.startswith('on')]
         self.words += [attributes.get(name, '') for name in ('src', 'href')]
         self._script = tag in ('script', 'style')
+        self._in = tag if tag in self.texts else self._in
+        self.describing |= (
+            {attributes['aria-describedby']} if 'aria-describedby' in attributes else set()
+        )
         self.inline += ['style'] if tag == 'style' else []
 
     def handle_data(self, data):
         if self._script and data.strip():
             self.inline.append(data)
+        if self._in and data.strip():
+            self.texts[self._in].add(data.strip())
 
     def handle_endtag(self, tag):
         self._script = False
+        self._in = '' if tag == self._in else self._in
 
 
 def test_the_page_keeps_to_its_policy_and_needs_no_network():
@@ -109,6 +118,9 @@ def test_the_page_keeps_to_its_policy_and_needs_no_network():
     page.feed((PAGE / 'index.html').read_text(encoding='utf-8'))
     assert page.inline == []
     assert len(page.ids) == len(set(page.ids))
+    assert page.texts['button'] & page.texts['li'] == set(), 'a step is not named as its button'
+    assert page.describing
+    assert page.describing <= set(page.ids)
     assert [word for word in page.words if '//' in word] == []
     for path in PAGE.glob('*.js'):
         code = re.sub(

@@ -54,6 +54,9 @@ export function nextStep({ connected, current, role, mine, state, stateAge, rest
   if (role !== 'operator') return { step: 0, text: 'You are looking on. To operate, open the operator’s address.' };
   const { lease, calibration, playing, dead_man: deadMan } = state;
   if (!mine && lease?.holder) return { step: 1, text: `${nameOf(lease.holder, state)} has the controls. Watch, or take over.` };
+  if (!mine && state.operating_state === 'ENABLED') {
+    return { step: 1, text: 'Enabled, and nobody operates: take the controls, or press PAUSE or Disable.' };
+  }
   if (!mine) return { step: 1, text: 'Take the controls. Nothing moves yet.' };
   if (!stateIsFresh(state, stateAge)) return { step: 0, text: 'The supervisor is silent. Nothing moves until it speaks.' };
   if (calibration?.running) return { step: 0, text: 'Calibrating: the instrument moves by itself. Esc pauses it.' };

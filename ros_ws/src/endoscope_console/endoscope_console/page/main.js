@@ -47,6 +47,7 @@ const app = {
   current: () => app.connected && app.state !== null && app.sinceState() < SILENT_CONSOLE_S,
   sees: () => app.connected && app.pictureAge() < BLIND_S,
   shown: () => app.tab === 'operate' && document.querySelector('dialog[open]') === null,
+  mayHalt: () => app.connected && app.role === 'operator',
   mayRecord: () => app.mine || (app.connected && app.role === 'operator' && !app.state?.lease?.holder),
   show,
   claimed() {

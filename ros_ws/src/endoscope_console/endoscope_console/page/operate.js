@@ -44,12 +44,12 @@ export class Operate {
     this._keys();
   }
 
-  /** Pause at once: what is held is let go of, and the server is told. */
+  /** Pause at once: what is held is let go of, and the server is told, whoever has the controls. */
   pause() {
     const { app } = this;
     app.deadMan.letGo('paused');
     for (const hold of Object.values(this._holds)) hold.cancel();
-    if (app.mine) this._order({ op: 'state', command: 'pause' }, 'Pause');
+    if (app.mayHalt()) this._order({ op: 'state', command: 'pause' }, 'Pause');
   }
 
   /** What a gamepad's other buttons ask for. */
@@ -57,9 +57,8 @@ export class Operate {
     const { app } = this;
     const enable = this._holds.KeyE;
     if (!asked.includes('enable down')) enable.release('gamepad');
-    if (!app.mine) return;
     if (asked.includes('pause')) this.pause();
-    if (!app.shown() || !document.hasFocus()) return;
+    if (!app.mine || !app.shown() || !document.hasFocus()) return;
     if (asked.includes('enable')) enable.press('gamepad');
     if (asked.includes('mode')) this.toggleMode('gamepad');
     if (asked.includes('faster')) this._stepScale(1);
@@ -185,7 +184,7 @@ export class Operate {
     const may = mine && app.connected && app.shown();
     const now = fresh ? state.operating_state : null;
     const busy = Boolean(state?.calibration?.running);
-    toggle($('pause'), 'disabled', !mine);
+    toggle($('pause'), 'disabled', !app.mayHalt());
     const claim = $('claim');
     const holder = state?.lease?.holder;
     write(claim, mine ? 'Give back' : holder && holder !== app.you ? 'Take over …' : 'Take the controls');
@@ -195,7 +194,7 @@ export class Operate {
     write($('enable').querySelector('span'), now === 'PAUSED' ? 'Resume' : 'Enable');
     this._holds.KeyH.enabled = may && now === 'ENABLED' && !busy;
     this._holds.KeyC.enabled = may && now === 'ENABLED' && !busy;
-    toggle($('disable'), 'disabled', !mine || now === 'DISABLED');
+    toggle($('disable'), 'disabled', !app.mayHalt() || now === 'DISABLED');
   }
 
   _renderHand() {

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 SILENCE_NS = 2_000_000_000
 """Without a sign of its holder the lease ends."""
+UNATTENDED_NS = 5_000_000_000
+"""A motion session whose operator has gone is paused after so long without another one."""
 
 
 @dataclass(frozen=True)
@@ -53,3 +55,23 @@ class Lease:
         silent = self.holder
         self.release(silent)
         return silent
+
+
+class Attendance:
+    """Whether a motion session that had an operator goes on without one; steady ns."""
+
+    def __init__(self) -> None:
+        self._session = ''
+        self._attended_ns = 0
+        self.lacks = False  # the session that is open has lost its operator
+
+    def turn(self, now_ns: int, session: str, attended: bool) -> bool:
+        """Judge at `now_ns`; whether to pause.  `session` is the one that is open, or empty."""
+        if session and attended:
+            self._session, self._attended_ns = session, now_ns
+        self.lacks = bool(session) and session == self._session and not attended
+        if not self.lacks or now_ns - self._attended_ns < UNATTENDED_NS:
+            return False
+        # Asked for again where it stays without effect.
+        self._attended_ns = now_ns
+        return True

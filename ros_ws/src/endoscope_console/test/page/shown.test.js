@@ -50,6 +50,7 @@ const CALIBRATED = { calibration: { result: { class_deg: 30 } } };
 test('a stranger is led to the first motion step by step', () => {
   const steps = [
     [{ mine: false }, state({ operating_state: 'DISABLED' }), 1, 'Take the controls'],
+    [{ mine: false }, state(), 1, 'nobody operates: take the controls, or press PAUSE'],
     [{ mine: false }, state({ lease: { holder: 'c7', operators: [{ name: 'c7', label: 'operator 7' }] } }), 1, 'operator 7'],
     [{}, state({ operating_state: 'DISABLED' }), 2, 'Hold Enable'],
     [{}, state({ operating_state: 'PAUSED' }), 2, 'Hold Resume'],
