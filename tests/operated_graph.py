@@ -4,7 +4,6 @@ import fcntl
 import io
 import os
 import pty
-import re
 import struct
 import subprocess
 import sys
@@ -12,8 +11,7 @@ import termios
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import dataclass
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from unittest.mock import patch
 
 import numpy as np
@@ -132,47 +130,19 @@ class OperatedGraph(SimulatedGraph):
         return status, out.getvalue(), errors.getvalue()
 
 
-@dataclass
-class Key:
-    """What a terminal sends for a key: when it is pressed, at each repeat, and when released."""
-
-    press: bytes
-    repeat: bytes
-    release: bytes = b''
-
-
-def plain(sent: bytes) -> Key:
-    """Key of a terminal that tells nothing apart."""
-    return Key(sent, sent)
-
-
-def told(code: str, final: str = 'u') -> Key:
-    """Key of a terminal with the protocol of kitty."""
-    return Key(*(f'\x1b[{code};1:{kind}{final}'.encode() for kind in (1, 2, 3)))
-
-
 class Typist:
     """`endoscope teleop` in a pseudo-terminal, and the one who types there.
 
-    A thread of its own answers and types as terminal and keyboard do, however slow the graph is.
-
-    Parameters
-    ----------
-    kitty
-        Whether the terminal speaks kitty's keyboard protocol.
-    command
-        Instead of teleop with these words.
+    A thread of its own types as a keyboard does, however slow the graph is.
     """
 
-    def __init__(self, graph, *words, kitty=False, command=None) -> None:
+    def __init__(self, graph, *words) -> None:
         self.graph = graph
         self.goals, self.wanted = graph.goals, graph.wanted
         self.goals.clear()
         self.wanted.clear()
         self.screen = b''
-        self._answer = b'\x1b[?0u\x1b[?62c' if kitty else b'\x1b[?62c'
-        self._answered = 0
-        self._held: list[Key] = []
+        self._held = b''
         self._longest_s = _LONGEST_HOLD_S
         self._open = True
         self.master, self.slave = pty.openpty()
@@ -180,7 +150,7 @@ class Typist:
         self.before = termios.tcgetattr(self.slave)
         teleop = [*ENDOSCOPE, 'teleop', *words, '--timeout', '60']
         self.process = subprocess.Popen(
-            [sys.executable, '-c', _TAKE_TERMINAL, *(command or teleop)],
+            [sys.executable, '-c', _TAKE_TERMINAL, *teleop],
             env=graph.environment | {'TERM': 'xterm'},
             stdin=self.slave,
             stdout=self.slave,
@@ -194,59 +164,50 @@ class Typist:
     def __enter__(self):
         return self
 
-    def __exit__(self, failed, *_):
+    def __exit__(self, *_):
         """End it as its user would; one that is killed stays in the graph for a while."""
         self.process.terminate()
         try:
-            # An interactive shell outlives this signal: its failed test is what there is to tell.
-            if failed is None:
-                self.end()
+            self.end()
         finally:
             self.process.kill()
             self.process.wait()
             self.hang_up()
 
     def _live(self) -> None:
-        """Read, answer, and have held keys repeat, as terminal and keyboard do."""
-        typing, due, until = [], 0.0, 0.0
+        """Read, and have a held key repeat, as terminal and keyboard do."""
+        typing, due, until = b'', 0.0, 0.0
         while self._open:
             self._read()
             now = time.monotonic()
             if typing and (typing != self._held or now > until):
-                self.type(b''.join(key.release for key in typing))
-                typing = []
+                typing = b''
                 time.sleep(0.3)
             elif self._held and not typing:
-                typing = list(self._held)
-                self.type(b''.join(key.press for key in typing))
+                typing = self._held
+                self.type(typing)
                 due, until = now + _DELAY_S, now + self._longest_s
             elif typing and now >= due:
                 due = now + _PERIOD_S
-                self.type(typing[-1].repeat)
+                self.type(typing)
             time.sleep(0.005)
 
     def _read(self) -> None:
-        try:
+        with suppress(OSError):
             while data := os.read(self.master, 65536):
                 self.screen += data
-        except OSError:
-            return
-        finally:
-            for _ in range(self.screen.count(b'\x1b[?u\x1b[c') - self._answered):
-                self._answered += 1
-                self.type(self._answer)
 
     def type(self, data: bytes) -> None:
         os.write(self.master, data)
 
     @property
     def line(self) -> str:
-        """The two lines that show what goes on."""
-        return self.screen.decode(errors='replace').rpartition('\r\x1b[J')[2]
+        """The last line."""
+        return self.text.rstrip().rpartition('\n')[2]
 
     @property
     def text(self) -> str:
-        return re.sub(r'\x1b\[[0-9;?<>]*[a-zA-Z]', '', self.screen.decode(errors='replace'))
+        return self.screen.decode(errors='replace')
 
     def until(self, condition, what='it') -> None:
         try:
@@ -268,14 +229,14 @@ class Typist:
                 return
         raise AssertionError(f'E enables nothing: {self.line!r}')
 
-    def hold(self, *keys: Key, until, what='motion', longest_s=_LONGEST_HOLD_S) -> None:
-        """Hold keys until something has come true; press them anew where that has ended."""
+    def hold(self, key: bytes, until, what='motion', longest_s=_LONGEST_HOLD_S) -> None:
+        """Hold a key until something has come true; press it anew where that has ended."""
         self._longest_s = longest_s
-        self._held = list(keys)
+        self._held = key
         try:
             self.until(until, what)
         finally:
-            self._held = []
+            self._held = b''
 
     def stands(self) -> bool:
         """Let half a second go on; whether the goals of the motors stood still in it."""

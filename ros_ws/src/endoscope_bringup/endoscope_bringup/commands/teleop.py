@@ -8,26 +8,21 @@ _KEYS = """\
 keys:
   arrows, or W A S D   bend while held: left and right bend_x, down and up bend_y
   [ ]                  slower, faster
-  - =                  smaller, larger scale: slave motion for one radian of the handle; only
-                       while nothing is held
   E                    enable, or resume after a pause: a session is opened, nothing moves yet
   P                    pause: the session ends, the slave holds where it is
   H                    home while held: the motors go back to zero; let go before they are
                        there and the graph is paused
-  Q, Ctrl-C            quit
+  Q, Ctrl-C, Ctrl-Z    quit
   space, any other     stop
 
-A held key is the dead-man. Most terminals tell only a key's repeats: then the slave moves from the
-first repeat, which comes after the keyboard's own delay of 0.25 to 0.66 s, and stops 0.15 s after
-the last one; a keyboard that repeats before 0.18 or after 0.7 s moves nothing. A terminal that
-speaks the keyboard protocol of kitty (kitty, foot, WezTerm, Ghostty, Alacritty, ...) tells press
-and release: then the slave moves from one to the other, two keys move both joints, and silence
-still stops it, 0.15 s after a repeat and 0.7 s after a press. After a stop that was no release the
-key has to be let go of and pressed again.
+A held key is the dead-man, by its repeats: the slave moves from the first one, which comes after
+the keyboard's own delay of 0.25 to 0.66 s, and stops 0.15 s after the last one; a keyboard that
+repeats before 0.18 or after 0.7 s moves nothing. After a stop that was no release the key has to be
+let go of and pressed again.
 
 The slave follows while the graph is ENABLED and `master.source` is `master`, which is set with
 your consent and set back at the end. Whatever ends this program, the clutch is released first: Q,
-Ctrl-C, Ctrl-Z, SIGTERM, a closed terminal; after a kill -9 the graph stops by itself, since the
+Ctrl-C, SIGTERM, a closed terminal; after a kill -9 the graph stops by itself, since the
 handle is silent.
 """
 

@@ -1,15 +1,12 @@
-"""The slave moved by the keyboard: keys in, handle and clutch out, and what is going on shown."""
+"""The slave moved by the keyboard: keys in, handle and clutch out, and what goes on in words."""
 
 import argparse
 import math
-import os
 import signal
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from types import FrameType
 
-from rclpy.task import Future
 from sensor_msgs.msg import JointState
 
 from endoscope_bags.errors import MalformedMessageError
@@ -19,11 +16,7 @@ from endoscope_core.choices import FOLLOW_THE_HANDLE, PLAYS
 from endoscope_core.errors import printable
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import MASTER, GraphError
-from endoscope_nodes.client.graph_parameters import (
-    read_parameter,
-    request_parameters,
-    set_parameters,
-)
+from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
 from endoscope_nodes.client.handle_sender import HandleSender, handle_senders
 from endoscope_nodes.client.order_feedback import HOME, OrderState
 from endoscope_nodes.names import (
@@ -45,9 +38,7 @@ _FRESH_NS = 150_000_000
 _SUPERVISED_NS = 1_000_000_000
 _GONE_S = 5.0
 _SETTLED_S = 0.2
-_SCALES = (0.01, 10.0)
-_LARGER = 1.25
-_STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+_STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
 
 
 def teleoperate(client: GraphClient, args: argparse.Namespace) -> int:
@@ -73,7 +64,7 @@ def teleoperate(client: GraphClient, args: argparse.Namespace) -> int:
         stack.callback(sender.close)
         speed = math.radians(args.speed)
         scale = args.scale or scale
-        teleoperation = _Teleoperation(client, terminal, sender, signals, speed, scale, before)
+        teleoperation = _Teleoperation(client, terminal, sender, signals, speed, scale)
         stack.enter_context(terminal)
         return teleoperation.run()
 
@@ -116,26 +107,11 @@ def _give_back(
     set_parameters(client, MASTER_NODE, before, patience_s)
 
 
-class _Signals:
-    """The last signal that asks this program to end, or to stop for a while."""
-
-    def __init__(self) -> None:
-        self.end = 0
-        self.suspend = False
-
-
 @contextmanager
-def _signals_noted() -> Iterator[_Signals]:
+def _signals_noted() -> Iterator[list[int]]:
     """Note signals instead of letting them tear the loop apart."""
-    noted = _Signals()
-
-    def note(number: int, frame: FrameType | None) -> None:
-        if number == signal.SIGTSTP:
-            noted.suspend = True
-        else:
-            noted.end = number
-
-    before = {number: signal.signal(number, note) for number in (*_STOPPING, signal.SIGTSTP)}
+    noted: list[int] = []
+    before = {n: signal.signal(n, lambda number, _: noted.append(number)) for n in _STOPPING}
     try:
         yield noted
     finally:
@@ -169,19 +145,16 @@ class _Teleoperation:
         client: GraphClient,
         terminal: Terminal,
         sender: HandleSender,
-        signals: _Signals,
+        signals: list[int],
         speed: float,
         scale: float,
-        before: dict[str, str | float],
     ) -> None:
         self._client = client
         self._terminal = terminal
         self._sender = sender
         self._signals = signals
-        self._speed = speed
-        self._scale = self._scale_asked = scale
-        self._before = before
-        self._setting: Future | None = None
+        self._scale = scale
+        self._hand = KeyboardHandle(len(JOINTS), speed)
         self._wanted = _Heard(client, SLAVE_COMMAND)
         self._measured = _Heard(client, SLAVE_MEASURED)
         self._motors = _Heard(client, MOTOR_COMMAND, MOTORS)
@@ -189,41 +162,31 @@ class _Teleoperation:
         # Orders that calibration had before the key for home was pressed; None while it is not.
         self._home: frozenset[int] | None = None
         self._quit = False
-        self._note = ''
+        self._said: tuple[str, ...] = ()
 
     def run(self) -> int:
         """Take turns until the operator quits, a signal comes or the terminal is lost."""
         due_ns = shown_ns = time.monotonic_ns()
         try:
-            self._open()
-            while not self._quit and not self._signals.end:
-                if self._signals.suspend:
-                    self._suspend()
+            self._terminal.open()
+            self._terminal.say(
+                'Arrows or WASD held: bend, from the first repeat of a key to 0.15 s after the '
+                'last. [ ] speed,\nE enable, P pause, H held: home, Q quit, any other key: stop. '
+                'Angles are wanted / measured.'
+            )
+            while not self._quit and not self._signals:
                 now_ns = time.monotonic_ns()
                 turn = self._take_turn(now_ns)
                 if now_ns >= shown_ns:
                     shown_ns = now_ns + _SHOWN_NS
-                    self._terminal.show(*self._lines(turn))
+                    self._show(turn)
                 due_ns = max(due_ns + _TURN_NS, time.monotonic_ns())
                 time.sleep(max(0, due_ns - time.monotonic_ns()) * 1e-9)
         except TerminalLostError:
-            self._signals.end = self._signals.end or signal.SIGHUP
+            self._signals.append(signal.SIGHUP)
         finally:
             self._let_go()
-        return 128 + self._signals.end if self._signals.end else 0
-
-    def _open(self) -> None:
-        self._terminal.open()
-        self._hand = KeyboardHandle(len(JOINTS), self._speed, self._terminal.told_apart)
-        way = (
-            'from press to release'
-            if self._terminal.told_apart
-            else 'from the first repeat of a key to 0.15 s after the last'
-        )
-        self._terminal.say(
-            f'Arrows or WASD held: bend, {way}. [ ] speed, - = scale, E enable, P pause, H held:\n'
-            'home, Q quit, any other key: stop. Angles are wanted / measured.'
-        )
+        return 128 + self._signals[0] if self._signals else 0
 
     def _let_go(self) -> None:
         """Release the clutch before anything else, and do not leave a way home to itself."""
@@ -232,24 +195,13 @@ class _Teleoperation:
             self._client.order('pause')
         self._home = None
 
-    def _suspend(self) -> None:
-        """Stop as Ctrl-Z asks, and go on with a new grip when the shell says so."""
-        self._signals.suspend = False
-        self._let_go()
-        self._terminal.close()
-        handler = signal.signal(signal.SIGTSTP, signal.SIG_DFL)
-        os.kill(os.getpid(), signal.SIGTSTP)
-        signal.signal(signal.SIGTSTP, handler)
-        self._speed = self._hand.speed
-        self._open()
-
     def _take_turn(self, now_ns: int) -> Turn:
-        events = self._terminal.read()
+        keys = self._terminal.read()
         self._client.hear()
         wall_ns = time.time_ns()
         turn = self._hand.turn(
             now_ns,
-            events,
+            keys,
             self._hindrance(wall_ns),
             self._wanted.since(max(self._gripped_ns, wall_ns - _FRESH_NS)),
             self._scale,
@@ -266,7 +218,6 @@ class _Teleoperation:
                 self._let_go()
         for request in turn.requests:
             self._obey(request)
-        self._settle()
         return turn
 
     def _hindrance(self, wall_ns: int) -> str:
@@ -293,51 +244,32 @@ class _Teleoperation:
     def _obey(self, request: Request) -> None:
         if request is Request.QUIT:
             self._quit = True
-        elif request is Request.SUSPEND:
-            self._signals.suspend = True
         elif request is Request.PAUSE:
             self._client.order('pause')
-        elif request is Request.ENABLE:
+        else:
             self._client.order('resume' if self._client.state == 'PAUSED' else 'enable')
-        elif self._setting is None:
-            factor = _LARGER if request is Request.LARGER else 1.0 / _LARGER
-            scale = min(_SCALES[1], max(_SCALES[0], self._scale * factor))
-            self._scale_asked = scale
-            self._before.setdefault('scale', self._scale)
-            self._setting = request_parameters(self._client, MASTER_NODE, {'scale': scale})
 
-    def _settle(self) -> None:
-        """Take the master's answer about its scale."""
-        if self._setting is None:
-            return
-        self._client.serve(0.001)
-        if self._setting.done():
-            result = self._setting.result().result
-            self._setting = None
-            self._note = '' if result.successful else result.reason
-            if result.successful:
-                self._scale = self._scale_asked
-
-    def _lines(self, turn: Turn) -> tuple[str, str]:
-        """State, lamp, angles and speed; and why it does not move."""
+    def _show(self, turn: Turn) -> None:
+        """Write a line where state, lamp, speed or the reason why it does not move has changed."""
         wall_ns = time.time_ns()
         wanted = self._wanted.since(wall_ns - _FRESH_NS)
         measured = self._measured.since(wall_ns - 2 * _FRESH_NS)
-        joints = '  '.join(
-            f'{name} {_degrees(wanted, k)}/{_degrees(measured, k)}' for k, name in enumerate(JOINTS)
-        )
         # What is wanted is obeyed where the compensator makes commands for the motors of it.
         obeyed = self._motors.since(wall_ns - _FRESH_NS) is not None
         follows = turn.clutch and wanted is not None and obeyed
         lamp = 'HOME' if turn.homing else 'FOLLOW' if follows else 'HELD' if turn.clutch else 'OPEN'
         speed = f'{math.degrees(self._hand.speed):.0f} deg/s x {self._scale:.2g}'
-        line = f'{self._client.state:<8} {lamp:<6} {joints} deg  {speed}'
-        return line, printable(self._why(turn, follows))
+        said = self._client.state, lamp, speed, printable(self._why(turn, follows))
+        if said == self._said:
+            return
+        self._said = said
+        joints = '  '.join(
+            f'{name} {_degrees(wanted, k)}/{_degrees(measured, k)}' for k, name in enumerate(JOINTS)
+        )
+        self._terminal.say(f'{said[0]:<8} {lamp:<6} {joints} deg  {speed}  {said[3]}'.rstrip())
 
     def _why(self, turn: Turn, follows: bool) -> str:
         """Why it does not move, in few words."""
-        if self._note:
-            return self._note
         if turn.clutch:
             at_limit = [name for name, is_at in zip(JOINTS, turn.at_limit, strict=True) if is_at]
             if at_limit:
