@@ -74,9 +74,10 @@ def test_noise_of_one_count_at_rest_moves_nothing(rate):
     assert np.max(np.abs(velocity)) < 1e-6
 
 
-def test_the_velocity_is_that_of_the_position():
+@pytest.mark.parametrize('scale', [1.0, 0.5])
+def test_the_velocity_is_that_of_the_position(scale):
     time, position, velocity = played(
-        handle(), 100, lambda t: (0.5 * math.sin(5.0 * t), 0.2 * math.cos(9.0 * t)), 2.0
+        handle(scale), 100, lambda t: (0.5 * math.sin(5.0 * t), 0.2 * math.cos(9.0 * t)), 2.0
     )
     difference = np.gradient(position, time, axis=0)
     assert np.max(np.abs(difference - velocity)[2:-2]) < 0.03

@@ -79,6 +79,13 @@ def test_what_a_late_loop_did_not_hear_is_no_silence():
         session.hear('session-2', now)
 
 
+def test_a_slow_loop_that_hears_nothing_leaves_within_three_turns():
+    session = joined()
+    for turn in range(1, 4):
+        session.beat((10 + 90 * turn) * MS)
+    assert 'silent' in session.trouble
+
+
 def test_a_loop_that_stood_still_leaves():
     session = joined()
     session.beat(111 * MS)

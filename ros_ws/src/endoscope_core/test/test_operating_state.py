@@ -63,8 +63,9 @@ def test_commands_that_are_refused_change_nothing(start, command):
     assert machine.state is start
 
 
-def test_fault_latches_until_the_cause_is_gone_and_enable_is_given():
-    machine = machine_in(OperatingState.ENABLED)
+@pytest.mark.parametrize('start', [OperatingState.ENABLED, OperatingState.PAUSED])
+def test_fault_latches_until_the_cause_is_gone_and_enable_is_given(start):
+    machine = machine_in(start)
     assert machine.report_cause('wire', 'wire_x_pos is broken')
     assert machine.state is OperatingState.FAULT
     refused = machine.command('enable', NOW)
