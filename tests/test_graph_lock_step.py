@@ -45,7 +45,7 @@ def test_two_runs_are_the_same_to_the_last_bit():
 
 def calibration(clock):
     """Result but for its time, and what was commanded and read until the motion had ended."""
-    overrides = {'calibration': {'motion': 'brief'}, 'conductor': clock}
+    overrides = {'calibration': {'motion': 'brief'}, 'simulation_clock': clock}
     with SimulatedGraph(overrides=overrides) as graph:
         streams = {topic: graph.listen(topic, names) for topic, names in STREAMS.items()}
         graph.enable()
