@@ -90,16 +90,14 @@ BENCHES: dict[str, Bench] = {
     ),
     'console': Bench(
         'console.console',
-        'how soon the slave stops whatever happens to the page, and what the console costs',
+        'how soon the slave stops whatever happens to the page',
         'Starts `endoscope console` with its graph and a real Chromium in which a key is held, '
         'lets one thing after the other happen to the page, and prints a table; then the latency '
-        'of an input, CPU time of the server and ticks of the graph with viewers. Exits 1 where '
-        'something moved without a new grip.',
+        'of an input. Exits 1 where something moved without a new grip.',
         (
             _count('--repetitions', 'of each event', 30),
             _option('--only', 'events to try; `all` for all', nargs='+', metavar='EVENT'),
             _count('--inputs', 'inputs whose latency is taken', 30),
-            _seconds(20.0, 'of each figure of cost'),
             _flag('--real-time', 'run the graph by the wall clock, with its deadlines'),
         ),
     ),
@@ -168,8 +166,6 @@ BENCHES: dict[str, Bench] = {
         (
             _seeds('of mistakes (1)', last=1),
             _seeds('of correct recordings (1-10)', '--sound', last=10),
-            _flag('--derive', 'derive the thresholds from the correct ones'),
-            _file('--write', 'module for them'),
             _jobs(),
         ),
     ),
@@ -218,11 +214,6 @@ BENCHES: dict[str, Bench] = {
         (
             _option('folder', 'folder of the recordings', type=Path),
             _file('--out', 'page to write (real.html)', Path('real.html')),
-            _flag(
-                '--taken-out',
-                'take each piece of the nominal physics out of each tube in turn instead, and look '
-                'for it; prints a table',
-            ),
             _jobs(),
         ),
     ),

@@ -35,9 +35,6 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     family.add_argument('source', type=Path, metavar='FOLDER', help='recordings of tubes')
     family.add_argument('--out', type=Path, metavar='FILE', help='YAML for the numbers')
-    family.add_argument(
-        '--figure', type=Path, metavar='FILE', help='PNG of simulated on recorded loops'
-    )
     for each in (classes, family):
         each.add_argument('--seed', type=seed, default=0, help='of the search (0)')
 
@@ -46,16 +43,14 @@ def run(args: argparse.Namespace) -> int:
     """Fit and write; return 0."""
     from endoscope_core.atomic_output import require_place
 
-    for file in (args.out, getattr(args, 'figure', None)):
-        if file is not None:
-            require_place(file)
+    if args.out is not None:
+        require_place(args.out)
     return _family(args) if args.fit == 'family' else _classes(args)
 
 
 def _family(args: argparse.Namespace) -> int:
-    from endoscope_core.atomic_output import atomic_file
     from endoscope_lab.identification.family_fit import tube_recordings
-    from endoscope_lab.identification.family_of_recordings import drawn, identified, table
+    from endoscope_lab.identification.family_of_recordings import identified, table
 
     recordings = tube_recordings(args.source)
     options = '' if args.out is None else f' --out {args.out.name}'
@@ -65,10 +60,6 @@ def _family(args: argparse.Namespace) -> int:
     if args.out is not None:
         found.family.save(args.out)
         _report(f'{args.out}: written')
-    if args.figure is not None:
-        with atomic_file(args.figure) as path:
-            drawn(recordings, found.family).savefig(path, format='png', dpi=90)
-        _report(f'{args.figure}: written')
     return 0
 
 

@@ -1,7 +1,6 @@
 """`endoscope train`: the classifier of wire tensions, from simulated rigs."""
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 
 from endoscope_bringup.subcommands import COUNT, seed
@@ -36,20 +35,14 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument(
         '--steps', type=COUNT, default=6000, metavar='N', help='steps of 64 recordings (6000)'
     )
-    parser.add_argument(
-        '--plots', type=Path, metavar='DIR', help='new folder for an SVG plot of the training curve'
-    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Train and write; return 0."""
-    from endoscope_core.atomic_output import atomic_directory, require_free_directory
     from endoscope_core.classifier.weights_file import save_weights, weights_path
     from endoscope_core.signals import calibration_motion
 
     out = weights_path(args.out)
-    if args.plots is not None:
-        require_free_directory(args.plots)
     calibration_motion(args.motion)
     from endoscope_lab.training.cnn_training import CnnTraining, description_of, train_cnn
 
@@ -63,9 +56,6 @@ def run(args: argparse.Namespace) -> int:
     described = description_of(trained, settings, args.seed, command)
     save_weights(out, trained.classifier.weights, described)
     kept.unlink(missing_ok=True)
-    if args.plots is not None:
-        with atomic_directory(args.plots) as folder:
-            (folder / 'training.svg').write_text(_training_figure(trained.curve), encoding='utf-8')
     for rate, told in trained.held_out.items():
         print(
             f'{out}: rigs held out, read at {rate}: nearest class right in '
@@ -74,24 +64,6 @@ def run(args: argparse.Namespace) -> int:
             f'{100.0 * told["refused"]:.1f} % refused'
         )
     return 0
-
-
-def _training_figure(curve: Sequence[tuple[int, float]]) -> str:
-    """SVG of the mean loss over the steps of a training."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    from endoscope_pages.still_pictures import STYLE, svg
-
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(5.2, 3.2), layout='constrained')
-        axis = figure.subplots()
-        steps, losses = zip(*curve, strict=True)
-        axis.plot(steps, losses, color='#2f6fb7', marker='o', markersize=2.5, linewidth=1.4)
-        axis.set_xlabel('step')
-        axis.set_ylabel('mean loss of a recording')
-        axis.set_title('training of the 1D-CNN')
-        return svg(figure)
 
 
 def _print_line(line: str) -> None:

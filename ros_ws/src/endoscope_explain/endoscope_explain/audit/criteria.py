@@ -1,6 +1,6 @@
 """Numbers by which mistakes are judged.
 
-Made from recordings without any by `endoscope bench mistakes --derive`, seeds 2001 to 2240.
+Derived once from recordings without any, seeds 2001 to 2240 of `endoscope bench mistakes`.
 """
 
 from endoscope_explain.audit.misfit import Criteria

@@ -1,23 +1,15 @@
-"""`endoscope bench console`: how soon the slave stops, and what the console costs."""
+"""`endoscope bench console`: how soon the slave stops, whatever happens to the page."""
 
 import argparse
-import json
 import math
 import os
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, suppress
 from pathlib import Path
 
-from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import ClientConnection, connect
-from websockets.typing import Origin
-
 from endoscope_lab.bench import (
-    cpu_seconds,
     require_known,
     spread,
     table_head,
@@ -70,12 +62,6 @@ def run(args: argparse.Namespace) -> int:
                 print()
                 for line in input_latency(hand, args.inputs):
                     print(line, flush=True)
-            if args.seconds:
-                for line in costs_with_browser(hand, args.seconds):
-                    print(line, flush=True)
-        if args.seconds:
-            for line in costs_of_viewers(console, args.seconds):
-                print(line, flush=True)
     return 1 if crept else 0
 
 
@@ -112,21 +98,8 @@ def _row(name: str, outcomes: Sequence[Outcome]) -> str:
     )
 
 
-VIEWERS = 4
 _STILL_S = 0.3
-_DIAGNOSTICS_S = 1.5
 _PAINTED = "performance.getEntriesByName('first-contentful-paint')[0]?.startTime"
-_FRAMES = """new Promise((done) => {
-  const begin = performance.now();
-  let frames = 0;
-  const count = () => {
-    frames += 1;
-    const seconds = (performance.now() - begin) / 1000;
-    if (seconds < 5) requestAnimationFrame(count);
-    else done(frames / seconds);
-  };
-  requestAnimationFrame(count);
-})"""
 
 
 def first_motion(hand: Hand, began_s: float) -> str:
@@ -170,59 +143,3 @@ def input_latency(hand: Hand, inputs: int) -> Iterator[str]:
             f'key to {topic}, {inputs} inputs: median {median:.0f} ms, 99 % {most:.0f} ms, '
             f'load average {os.getloadavg()[0]:.1f}'
         )
-
-
-def costs_of_viewers(console: ServedConsole, seconds: float) -> Iterator[str]:
-    """In words, the server's CPU time and the graph's ticks while this machine runs no browser."""
-    yield _cost(console, seconds, 'nobody looks on')
-    with ExitStack() as stack:
-        for _ in range(VIEWERS):
-            _view(console, stack)
-        yield _cost(console, seconds, f'{VIEWERS} pages look on')
-
-
-def costs_with_browser(hand: Hand, seconds: float) -> Iterator[str]:
-    """CPU time of the server, ticks of the graph and frames of a page in a browser, in words."""
-    # The operator's page is the first client.
-    console = hand.console
-    hand.take_controls()
-    yield _cost(console, seconds, 'the browser operates')
-    hand.give_back()
-    yield _cost(console, seconds, 'the browser looks on')
-    frames = hand.tab.value(_FRAMES)
-    yield f'page: {frames:.0f} animation frames/s, load average {os.getloadavg()[0]:.1f}'
-
-
-def _cost(console: ServedConsole, seconds: float, what: str) -> str:
-    ticks, missed = _ticks(console)
-    cpu, began = cpu_seconds(console.pid), time.monotonic()
-    console.passes(seconds)
-    share = (cpu_seconds(console.pid) - cpu) / (time.monotonic() - began)
-    after, missed_after = _ticks(console)
-    made = after - ticks
-    return (
-        f'{what}: server {100 * share:.1f} % of a core, graph '
-        f'{100 * made / (made + missed_after - missed):.1f} % of its ticks, {seconds:.0f} s, '
-        f'load average {os.getloadavg()[0]:.1f}'
-    )
-
-
-def _ticks(console: ServedConsole) -> tuple[int, int]:
-    """Ticks of the graph so far, and those that it missed, as it says once a second."""
-    console.passes(_DIAGNOSTICS_S)
-    values = console.client.health['motor_driver: device'].values
-    return int(values['ticks']), int(values['missed ticks'])
-
-
-def _view(console: ServedConsole, stack: ExitStack) -> None:
-    """Look on as one more page does, and drop what comes."""
-    address = f'ws://127.0.0.1:{console.port}/telemetry'
-    socket = stack.enter_context(connect(address, origin=Origin(console.address), compression=None))
-    socket.send(json.dumps({'op': 'hello', 'token': console.viewer_token}))
-    threading.Thread(target=_drain, args=(socket,), daemon=True).start()
-
-
-def _drain(socket: ClientConnection) -> None:
-    with suppress(ConnectionClosed):
-        for _ in socket:
-            continue

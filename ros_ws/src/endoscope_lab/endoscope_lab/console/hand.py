@@ -74,11 +74,6 @@ class Hand(ClosedOnExit):
         if enable and client.state != 'ENABLED':
             client.ask('resume' if client.state == 'PAUSED' else 'enable')
 
-    def give_back(self) -> None:
-        self.let_go()
-        if self._seen(_MINE):
-            self._seen(f'{_CLAIM}.click()')
-
     def press(self, code: str) -> None:
         """Press a key and keep it down."""
         self.tab.key(code, True)

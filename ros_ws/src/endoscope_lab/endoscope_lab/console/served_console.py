@@ -101,9 +101,8 @@ class ServedConsole(ClosedOnExit):
             for topic, heard in ((MASTER_MEASURED, self.handle), (MOTOR_COMMAND, self.motors)):
                 self.client.listen(JointState, topic, heard.take, qos=_DEEP)
             self.client.listen(Joy, MASTER_CLUTCH, self._on_clutch, qos=EVENT)
-            operate, look_on = self.log.read_text().splitlines()[:2]
+            operate = self.log.read_text().splitlines()[0]
             self.address, _, self.token = operate.split()[-1].partition('/#token=')
-            self.viewer_token = look_on.partition('#token=')[2].strip()
             self.until(lambda: len(self.client.heard_ns) >= 9, 'all nodes')
         except BaseException:
             self.close()
@@ -115,10 +114,6 @@ class ServedConsole(ClosedOnExit):
             if time.monotonic() > end or self._process.poll() is not None:
                 raise ConsoleError(f'the console does not start: {self.log.read_text()[-2000:]}')
             time.sleep(0.1)
-
-    @property
-    def pid(self) -> int:
-        return self._process.pid
 
     @property
     def port(self) -> int:

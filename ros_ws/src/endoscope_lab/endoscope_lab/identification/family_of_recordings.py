@@ -1,11 +1,11 @@
-"""The rig identified from recordings of its tubes: fit, table and figure."""
+"""The rig identified from recordings of its tubes: fit and table."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,9 +18,6 @@ from endoscope_lab.identification.family_fit import (
     misfit,
     read,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 LEFT = """\
 left, rms: angle in deg, tensions of both wires in N; first cycle (fitted) | second (judged)
@@ -120,37 +117,6 @@ def settled(recording: TubeRecording, number: int) -> slice:
     # The first quarter of a recording starts from rest and is on no loop.
     quarter = recording.cycles[1] // 4
     return slice(quarter, recording.cycles[1] + quarter)
-
-
-def drawn(recordings: Sequence[TubeRecording], family: TubeFamily) -> Figure:
-    """Loops of angle and of tensions, simulated on recorded, a column for each tube."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(4.2 * len(recordings), 11.0), layout='constrained')
-    axes = figure.subplots(3, len(recordings), squeeze=False)
-    for column, recording in zip(axes.T, recordings, strict=True):
-        angle, tension = read(family, recording.bend, recording.desired, recording.tick)
-        desired = recording.desired / _RAD
-        time = recording.tick * np.arange(len(desired))
-        column[0].plot(desired, recording.angle / _RAD, 'k', lw=0.8, label='recorded')
-        column[0].plot(desired, angle / _RAD, 'C3', lw=1.0, label='simulated')
-        for wire, colour in enumerate(('C0', 'C1')):
-            column[1].plot(desired, recording.tension[:, wire], 'k', lw=0.8)
-            column[1].plot(desired, tension[:, wire], colour, lw=1.0)
-            column[2].plot(time, tension[:, wire] - recording.tension[:, wire], colour, lw=0.8)
-        column[2].plot(time, (angle - recording.angle) / _RAD, 'C3', lw=0.8)
-        column[2].axvline(time[recording.cycles[1]], color='0.6', lw=0.8)
-        column[2].set_ylim(-6.0, 6.0)
-        column[0].set_title(f'tube bent by {_bend(recording)} deg')
-        for axis, label in zip(
-            column, ('angle, deg', 'tensions, N', 'left, deg and N'), strict=True
-        ):
-            axis.set_ylabel(label)
-            axis.grid(lw=0.4)
-        column[1].set_xlabel('command, deg')
-        column[2].set_xlabel('time, s (line: end of the fitted cycle)')
-    axes[0, 0].legend(frameon=False)
-    return figure
 
 
 def _bend(recording: TubeRecording) -> int:

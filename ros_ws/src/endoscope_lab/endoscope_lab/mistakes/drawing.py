@@ -154,3 +154,10 @@ def described(recording: Recording) -> PlantDescription:
 def names_of(rng: Generator, count: int = 1) -> tuple[str, ...]:
     """Names of one or two joints, of `count` at least."""
     return ('bend_x', 'bend_y')[: max(count, int(rng.integers(1, 3)))]
+
+
+def sound_recording(seed: int) -> Recording:
+    """A recording of a rig with one or two effects of up to their bounds; one in ten noiseless."""
+    rng = np.random.default_rng(seed)
+    noisy = bool(rng.random() < 0.9)
+    return draw_recording(rng, names_of(rng), 0.3, 1.0, int(rng.integers(1, 3)), noisy)[0]

@@ -3,40 +3,33 @@
 import argparse
 import time
 from collections.abc import Callable
-from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from endoscope_core.atomic_output import write_text
-from endoscope_core.errors import EndoscopeError
 from endoscope_core.workers import worker_pool
 from endoscope_explain.audit import AuditReport, audit_recording
 from endoscope_explain.recording import BENDING, COMMAND, MOTOR, WIRES, Recording
 from endoscope_lab.bench import table_head, table_row
-from endoscope_lab.mistakes import deriving
-from endoscope_lab.mistakes.deriving import sound_recording
-from endoscope_lab.mistakes.drawing import Generator, described, draw_recording, names_of
+from endoscope_lab.mistakes.drawing import (
+    Generator,
+    described,
+    draw_recording,
+    names_of,
+    sound_recording,
+)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print what was not reported correctly and a table, or the thresholds; return 0."""
-    with worker_pool(args.jobs) as pool:
-        if args.derive:
-            _derive(args, pool)
-        else:
-            _measure(args, pool)
-    return 0
-
-
-def _measure(args: argparse.Namespace, pool: Executor) -> None:
+    """Print what was not reported correctly and a table; return 0."""
     cases = [(name, seed) for name in MISTAKES for seed in args.seeds]
     cases += [('', seed) for seed in args.sound]
     rows = []
-    for row in pool.map(audited, *zip(*cases, strict=True)):
-        rows.append(row)
-        if not row.right:
-            print(f'{row.name or "no mistake"}, seed {row.seed}: {"; ".join(row.said) or "-"}')
+    with worker_pool(args.jobs) as pool:
+        for row in pool.map(audited, *zip(*cases, strict=True)):
+            rows.append(row)
+            if not row.right:
+                print(f'{row.name or "no mistake"}, seed {row.seed}: {"; ".join(row.said) or "-"}')
     wrong = [row for row in rows if row.name]
     sound = [row for row in rows if not row.name]
     right = sum(row.right for row in wrong)
@@ -53,21 +46,7 @@ def _measure(args: argparse.Namespace, pool: Executor) -> None:
     }
     print(table_head(*cells))
     print(table_row(*cells.values()))
-
-
-def _derive(args: argparse.Namespace, pool: Executor) -> None:
-    try:
-        partly = deriving.without_worth(list(pool.map(deriving.seen, args.sound)))
-        worths = list(pool.map(deriving.least_worth, args.sound, [partly] * len(args.sound)))
-        criteria = deriving.derived(partly, worths)
-    except ValueError as error:
-        raise EndoscopeError(str(error)) from error
-    first, last = min(args.sound), max(args.sound)
-    made_by = f'`endoscope bench mistakes --derive`, seeds {first} to {last}'
-    print(deriving.source(criteria, made_by))
-    print(deriving.sensitivity(criteria, worths))
-    if args.write:
-        write_text(args.write, deriving.source(criteria, made_by))
+    return 0
 
 
 Change = Callable[[Recording, Generator], Recording]

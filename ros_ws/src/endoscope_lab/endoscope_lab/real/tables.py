@@ -27,7 +27,6 @@ from endoscope_lab.real.explained import (
     unknown_tubes,
 )
 from endoscope_lab.real.rig import Told
-from endoscope_lab.real.taken_out import as_table, taken_out
 from endoscope_lab.real.takes import between_cycles, require_recordings
 from endoscope_pages import html_table, render_page
 from endoscope_pages.still_pictures import INK, STYLE, svg, thinned
@@ -40,9 +39,6 @@ def run(args: argparse.Namespace) -> int:
     require_recordings(args.folder)
     # A fit's matrices are tall and narrow: threads would only wait for each other.
     with threadpool_limits(1, 'blas'):
-        if args.taken_out:
-            print(as_table(taken_out(args.folder, args.jobs, report)))
-            return 0
         tubes = explained_tubes(args.folder, args.jobs, report)
         state = explained_state(args.folder, tubes, args.jobs, report)
         unknown = unknown_tubes(args.folder, tubes, report)
