@@ -13,7 +13,12 @@ os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 # Tests talk to nobody outside this machine.
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-pytest_plugins = ['run_report']
+pytest_plugins = ['run_report', 'explained_corpus']
+
+
+@pytest.fixture(autouse=True)
+def explained_once(corpus):
+    """Refuse the engine what the corpus has not."""
 
 
 @pytest.fixture(scope='module')

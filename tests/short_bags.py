@@ -17,6 +17,7 @@ from endoscope_core.physics import (
     simulate,
 )
 from endoscope_core.rig import load_rig
+from endoscope_explain.recording import motor_name, wire_names
 
 Stamps = NDArray[np.int64]
 
@@ -38,6 +39,7 @@ def write_short_bag(
     spoil: float | None = None,
     restamped: Mapping[str, Callable[[Stamps], Stamps]] | None = None,
     rigs: Sequence[str] = ('rig',),
+    tracker_unit: float = 1.0,
 ) -> Path:
     """Write a recording of a sweep and some steps.
 
@@ -45,7 +47,7 @@ def write_short_bag(
     ----------
     path : Path
     plant : PlantDescription
-        With one joint, `bend_x`.
+        Its second joint, if it has one, moves half as far and later.
     duration : float
         In s.
     seed : int
@@ -58,22 +60,27 @@ def write_short_bag(
         What its stamps become in ns; receipt stays as it is.
     rigs : sequence of str
         Namespaces that the same is written under.
+    tracker_unit : float
+        In which angles are written, in rad.
     """
     restamped = restamped or {}
     time = np.arange(0.0, duration, 1e-3)
     angle = np.where(
         time < 0.7 * duration, 0.9 * np.sin(2.2 * time), 0.4 * np.sign(np.sin(6.0 * time))
     )
-    command = angle[:, None] * load_rig().joints.gear
+    joints = plant.joint_names()
+    angles = [angle, 0.5 * np.roll(angle, len(angle) // 3)][: len(joints)]
+    command = np.stack(angles, axis=1) * load_rig().joints.gear
     truth, sensors = simulate(plant, command), SensorModel(plant.sensors, seed)
-    bending = sensors.bending(truth.bending[::25])
+    bending = sensors.bending(truth.bending[::25]) / tracker_unit
     if spoil is not None:
         bending[20, 0] = spoil
     stamps = (time * 1e9).round().astype(np.int64) + 1_700_000_000_000_000_000
+    motors = [motor_name(joint) for joint in joints]
     quantities = {
-        'motor/servo_jp': (['motor_x'], stamps, {'position': command}),
+        'motor/servo_jp': (motors, stamps, {'position': command}),
         'motor/measured_js': (
-            ['motor_x'],
+            motors,
             stamps,
             {
                 'position': sensors.shaft_position(truth.shaft_position),
@@ -82,11 +89,11 @@ def write_short_bag(
             },
         ),
         'wires/measured_js': (
-            ['wire_x_pos', 'wire_x_neg'],
+            [wire for joint in joints for wire in wire_names(joint)],
             stamps,
-            {'effort': sensors.tension(truth.tension)[:, 0]},
+            {'effort': sensors.tension(truth.tension).reshape(len(time), -1)},
         ),
-        'slave/measured_js': (['bend_x'], stamps[::25], {'position': bending}),
+        'slave/measured_js': (joints, stamps[::25], {'position': bending}),
     }
     with BagWriter(path) as bag:
         bag.write_streams(

@@ -12,6 +12,8 @@ from endoscope_bags.metadata import METADATA
 from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_nodes.names import SLAVE_COMMAND
 
+pytestmark = pytest.mark.engine
+
 PLANT_NAME = 'described.yaml'
 
 

@@ -9,6 +9,8 @@ from playwright.sync_api import expect
 
 from endoscope_core.physics import PlantDescription, save_plant
 
+pytestmark = pytest.mark.engine
+
 FAR = 0.03
 """rad at a motor's shaft that no noise makes."""
 WHY = 'Why: Nothing is known of the rig yet but its description.'

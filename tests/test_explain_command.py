@@ -8,20 +8,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from short_bags import PLANT, one_joint, write_short_bag
+from short_bags import PLANT, write_short_bag
 
 from endoscope_bringup import cli
 from endoscope_core.physics import EffectSpec, JointParameters, load_plant, save_plant
 
 
-@pytest.fixture(scope='module')
-def rig(tmp_path_factory):
+@pytest.fixture
+def rig(tmp_path_factory, corpus):
     """A folder with a plant file, a sound bag and one of a rig with an end stop."""
     folder = tmp_path_factory.mktemp('rig')
     save_plant(PLANT, folder / 'plant.yaml')
-    write_short_bag(folder / 'sound')
-    stop = one_joint(EffectSpec('joint_stop', 'bend_x', {'angle_rad': 0.12}))
-    write_short_bag(folder / 'stopped.mcap', stop, seed=2)
+    for name in ('sound', 'stopped'):
+        (folder / f'{name}.mcap').symlink_to(corpus.bag(name))
     return folder
 
 
@@ -62,7 +61,7 @@ def test_a_stop_is_named_shown_and_exported(rig, tmp_path, capsys):
 
 def test_the_exported_plant_is_what_simulate_runs(rig, tmp_path):
     out = tmp_path / 'out'
-    assert explain(rig, out, rig / 'sound', '--quick') == 0
+    assert explain(rig, out, rig / 'sound.mcap', '--quick') == 0
     assert (
         cli.main(
             [
@@ -70,7 +69,7 @@ def test_the_exported_plant_is_what_simulate_runs(rig, tmp_path):
                 '--plant',
                 str(out / 'plant.yaml'),
                 '--commands',
-                str(rig / 'sound'),
+                str(rig / 'sound.mcap'),
                 '--out',
                 str(tmp_path / 'answer'),
             ]
@@ -86,8 +85,10 @@ def summary(out):
 
 
 def test_many_bags_have_one_report_each_and_one_table(rig, tmp_path, capsys):
-    write_short_bag(tmp_path / 'other' / 'sound', seed=5)
-    bags = (rig / 'sound', tmp_path / 'other' / 'sound')
+    other = tmp_path / 'other' / 'sound.mcap'
+    other.parent.mkdir()
+    other.write_bytes((rig / 'sound.mcap').read_bytes())
+    bags = (rig / 'sound.mcap', other)
     assert explain(rig, tmp_path / 'out', *bags, '--quick', '--jobs', '2', '--json') == 0
     assert summary(tmp_path / 'out') == {'sound': 'consistent', 'sound_2': 'consistent'}
     for name in ('sound', 'sound_2'):
@@ -109,19 +110,20 @@ def test_many_bags_have_one_report_each_and_one_table(rig, tmp_path, capsys):
     assert {name for name, row in rows.items() if row['sound']} == shown < set(rows)
 
 
-def test_a_bag_that_cannot_tell_costs_the_others_nothing(rig, tmp_path):
-    brief = write_short_bag(tmp_path / 'brief', duration=1.0)
-    assert explain(rig, tmp_path / 'out', rig / 'sound', brief, '--quick') == 0
-    assert summary(tmp_path / 'out') == {'sound': 'consistent', 'brief': 'insufficient_data'}
+@pytest.mark.engine
+def test_bags_that_cannot_tell_are_reported_by_a_process_of_its_own(tmp_path):
+    save_plant(PLANT, tmp_path / 'plant.yaml')
+    bags = [write_short_bag(tmp_path / name, duration=1.0) for name in ('brief', 'short')]
+    assert explain(tmp_path, tmp_path / 'out', *bags, '--quick', '--jobs', '1') == 0
+    assert summary(tmp_path / 'out') == dict.fromkeys(('brief', 'short'), 'insufficient_data')
     assert (tmp_path / 'out' / 'brief' / 'report.html').is_file()
 
 
-def test_sound_recordings_of_one_rig_share_no_missing_physics(rig, tmp_path, capsys):
-    write_short_bag(tmp_path / 'other' / 'sound', seed=5)
-    bags = (rig / 'sound', tmp_path / 'other' / 'sound')
+def test_sound_recordings_of_one_rig_share_no_missing_physics(rig, corpus, tmp_path, capsys):
     out = tmp_path / 'out'
+    bags = (corpus.bag('again'), rig / 'sound.mcap')
     assert explain(rig, out, *bags, '--quick', '--same-physics') == 0
-    assert summary(out) == {'sound': 'consistent', 'sound_2': 'consistent'}
+    assert summary(out) == {'again': 'consistent', 'sound': 'consistent'}
     assert 'only noise is left beside nothing' in capsys.readouterr().err
 
 
@@ -139,11 +141,11 @@ def test_a_lacking_topic_is_named(rig, tmp_path, capsys, topic):
     assert topic in refused(capsys, rig, tmp_path / 'out', bag)
 
 
-def test_a_rig_without_load_cells_is_explained_and_what_cannot_be_told_is_said(
-    rig, tmp_path, capsys
-):
+@pytest.mark.engine
+def test_a_rig_without_load_cells_is_explained_and_what_cannot_be_told_is_said(tmp_path, capsys):
+    save_plant(PLANT, tmp_path / 'plant.yaml')
     bag = write_short_bag(tmp_path / 'bag', leave_out='wires/measured_js')
-    assert explain(rig, tmp_path / 'out', bag, '--quick') == 0
+    assert explain(tmp_path, tmp_path / 'out', bag, '--quick') == 0
     printed = capsys.readouterr()
     assert 'audit: wires/measured_js was not recorded: the torque of the motor alone' in printed.err
     assert printed.out.startswith('The described plant predicts the recording of bend_x.')
@@ -159,7 +161,7 @@ def test_a_reading_that_is_not_finite_is_named(rig, tmp_path, capsys, value):
 
 def test_the_second_recording_is_named_where_it_is_the_bad_one(rig, tmp_path, capsys):
     bad = write_short_bag(tmp_path / 'bad', spoil=np.nan)
-    message = refused(capsys, rig, tmp_path / 'out', rig / 'sound', '--validate', bad)
+    message = refused(capsys, rig, tmp_path / 'out', rig / 'sound.mcap', '--validate', bad)
     assert str(bad) in message
 
 
@@ -180,7 +182,10 @@ def test_a_wrong_key_of_the_plant_is_named_with_the_nearest(rig, tmp_path, capsy
     plant = tmp_path / 'plant.yaml'
     plant.write_text('joints: {bend_x: {pretention: 5.0}}\n')
     out = tmp_path / 'out'
-    assert cli.main(['explain', str(rig / 'sound'), '--plant', str(plant), '--out', str(out)]) == 2
+    assert (
+        cli.main(['explain', str(rig / 'sound.mcap'), '--plant', str(plant), '--out', str(out)])
+        == 2
+    )
     message = capsys.readouterr().err
     assert 'pretention' in message
     assert 'pretension' in message
@@ -189,7 +194,7 @@ def test_a_wrong_key_of_the_plant_is_named_with_the_nearest(rig, tmp_path, capsy
 
 def test_one_bad_bag_among_good_ones_is_refused_before_any_work(rig, tmp_path, capsys):
     bad = write_short_bag(tmp_path / 'bad', leave_out='slave/measured_js')
-    message = refused(capsys, rig, tmp_path / 'out', rig / 'sound', bad)
+    message = refused(capsys, rig, tmp_path / 'out', rig / 'sound.mcap', bad)
     assert 'bad' in message
 
 
@@ -199,13 +204,12 @@ def test_of_two_rigs_in_a_bag_one_has_to_be_chosen(rig, tmp_path, capsys):
     assert explain(rig, tmp_path / 'out', both, '--namespace', 'right', '--quick') == 0
 
 
-def test_joints_that_were_not_recorded_stay_in_the_plant_as_described(tmp_path):
+def test_joints_that_were_not_recorded_stay_in_the_plant_as_described(corpus, tmp_path):
     load = EffectSpec('external_load', 'bend_y', {'moment_nm': 0.002, 'time_s': 1.0})
     joints = {**PLANT.joints, 'bend_y': JointParameters(pretension=4.5)}
     described = replace(PLANT, joints=joints, effects=(load,))
     save_plant(described, tmp_path / 'plant.yaml')
-    bag = write_short_bag(tmp_path / 'bag')
-    assert explain(tmp_path, tmp_path / 'out', bag, '--quick') == 0
+    assert explain(tmp_path, tmp_path / 'out', corpus.bag('sound'), '--quick') == 0
     improved = load_plant(tmp_path / 'out' / 'plant.yaml')
     assert list(improved.joints) == ['bend_x', 'bend_y']
     assert improved.joints['bend_y'] == joints['bend_y']
@@ -214,27 +218,29 @@ def test_joints_that_were_not_recorded_stay_in_the_plant_as_described(tmp_path):
 
 def test_a_folder_that_holds_something_is_left_alone(rig, tmp_path, capsys):
     (tmp_path / 'kept.txt').write_text('mine')
-    assert explain(rig, tmp_path, rig / 'sound') == 2
+    assert explain(rig, tmp_path, rig / 'sound.mcap') == 2
     assert 'not empty' in capsys.readouterr().err
     assert [p.name for p in tmp_path.iterdir()] == ['kept.txt']
 
 
 def test_a_place_that_takes_nothing_is_refused_before_any_work(rig, tmp_path, capsys):
     (tmp_path / 'file').write_text('mine')
-    assert explain(rig, tmp_path / 'file' / 'out', rig / 'sound') == 2
+    assert explain(rig, tmp_path / 'file' / 'out', rig / 'sound.mcap') == 2
     printed = capsys.readouterr()
     assert f'{tmp_path / "file"} is a file' in printed.err
     assert printed.out == ''
 
 
 def test_second_recordings_that_do_not_match_the_bags_are_refused(rig, tmp_path, capsys):
-    seconds = [option for _ in range(3) for option in ('--validate', rig / 'sound')]
-    message = refused(capsys, rig, tmp_path / 'out', rig / 'sound', rig / 'sound', *seconds)
+    seconds = [option for _ in range(3) for option in ('--validate', rig / 'sound.mcap')]
+    message = refused(
+        capsys, rig, tmp_path / 'out', rig / 'sound.mcap', rig / 'sound.mcap', *seconds
+    )
     assert '--validate was given 3 times for 2 bags' in message
 
 
 def test_one_physics_for_all_bags_leaves_no_room_for_a_baseline(rig, tmp_path, capsys):
-    bags = (rig / 'sound', rig / 'stopped.mcap')
-    options = ('--same-physics', '--baseline', rig / 'sound')
+    bags = (rig / 'sound.mcap', rig / 'stopped.mcap')
+    options = ('--same-physics', '--baseline', rig / 'sound.mcap')
     message = refused(capsys, rig, tmp_path / 'out', *bags, *options)
     assert 'same physics and a baseline are mutually exclusive' in message

@@ -1,7 +1,5 @@
 """Recordings whose header stamps are those of no clock or of another one."""
 
-import json
-
 import numpy as np
 import pytest
 from short_bags import PLANT, write_short_bag
@@ -16,7 +14,7 @@ def explain(tmp_path, capsys):
     save_plant(PLANT, tmp_path / 'plant.yaml')
 
     def explain(restamped):
-        bag = write_short_bag(tmp_path / 'bag', restamped=restamped)
+        bag = write_short_bag(tmp_path / 'bag', duration=1.5, restamped=restamped)
         plant, out = tmp_path / 'plant.yaml', tmp_path / 'out'
         words = ['explain', str(bag), '--plant', str(plant), '--out', str(out), '--quick']
         return cli.main(words), capsys.readouterr()
@@ -53,12 +51,11 @@ def first_two_zero(stamps):
     return np.where(np.arange(len(stamps)) < 2, 0, stamps)
 
 
-def test_stray_stamps_are_left_out_and_noted(explain, tmp_path):
+@pytest.mark.engine
+def test_stray_stamps_are_left_out_and_noted(explain):
     status, printed = explain({'slave/measured_js': first_two_zero})
     assert status == 0
-    assert 'note: 2 of 160 messages of /rig/slave/measured_js are left out' in printed.err
-    report = json.loads((tmp_path / 'out' / 'report.json').read_text())
-    assert report['verdict'] == 'consistent'
+    assert 'note: 2 of 60 messages of /rig/slave/measured_js are left out' in printed.err
 
 
 @pytest.mark.parametrize('topic', TOPICS)

@@ -142,6 +142,7 @@ def sound(tmp_path_factory):
     return folder
 
 
+@pytest.mark.engine
 @pytest.mark.parametrize('blocked', BLOCKED)
 @pytest.mark.parametrize('words', WRITING)
 def test_outputs_that_cannot_be_written_are_one_line(words, blocked, hostile, sound, capsys):

@@ -21,6 +21,8 @@ from endoscope_nodes.client.motion_player import MotionPlayer
 from endoscope_nodes.names import SLAVE_COMMAND
 from endoscope_nodes.nodes.recorder import RecorderNode
 
+pytestmark = pytest.mark.engine
+
 LARGEST = 0.5
 
 

@@ -29,6 +29,8 @@ from endoscope_nodes.client.motion_player import MotionPlayer
 from endoscope_nodes.names import MASTER_CLUTCH, MOTION_SESSION, SLAVE_COMMAND
 from endoscope_nodes.runtime.qos import EVENT
 
+pytestmark = pytest.mark.engine
+
 UNDER_WAY = 0.2
 """Shaft angle in rad at which the motion is under way."""
 PATIENCE_S = 240.0

@@ -18,6 +18,8 @@ from endoscope_explain.pipeline import Sources
 from endoscope_explain.recording import SETPOINT, recording_from_bag
 from endoscope_nodes.runtime.private_domain import private_domain
 
+pytestmark = pytest.mark.engine
+
 PLANT = PlantDescription()
 
 

@@ -119,13 +119,13 @@ def refuse_other_joints(
 
 def explain_case(
     inputs: Inputs,
-    engine: Engine = explain_recording,
+    engine: Engine | None = None,
     *,
     jobs: int = 2,
     progress: Progress | None = None,
     answered: Callable[[ExplainedCase], None] | None = None,
 ) -> ExplainedCase:
-    """Explain a recording by `engine`, which is told what to explain as `explain_recording` is."""
+    """Explain a recording by `explain_recording`, or another engine that takes what it takes."""
     # The case is handed to `answered` once it is explained, before a next experiment is looked for.
     begun = time.monotonic()
     tell = progress or (lambda _: None)
@@ -136,7 +136,7 @@ def explain_case(
         tell(f'audit: {other}')
     # A fit's matrices are tall and narrow: threads would only wait for each other.
     with threadpool_limits(1, 'blas'):
-        explanation = engine(
+        explanation = (engine or explain_recording)(
             audit.recording,
             inputs.plant,
             baseline=inputs.baseline,

@@ -27,6 +27,12 @@ from endoscope_explain.recording import Recording, Series
 # Tests import each other's recordings by name.
 sys.path.insert(0, str(Path(__file__).parent))
 
+
+@pytest.fixture(autouse=True)
+def explained_once(corpus):
+    """Refuse the engine what the corpus has not."""
+
+
 TICK = 1e-3
 TRACKER_EVERY = 25
 

@@ -39,6 +39,8 @@ from endoscope_explain.investigation.motions import (
 from endoscope_explain.pipeline import Inputs, Sources, explain_case
 from endoscope_explain.takes import inputs_joined
 
+pytestmark = pytest.mark.engine
+
 TO_ONE_SIDE = sequence(
     'to one side', [hold(1.0), move(0.0, 0.9, 2.0), hold(1.5, 0.9), move(0.9, 0.0, 2.0), hold(1.0)]
 )
