@@ -223,6 +223,14 @@ def test_a_writer_that_is_not_atomic_keeps_what_it_has(tmp_path):
     assert open_bag(tmp_path / 'bag').message_count == 3000
 
 
+def test_the_sequence_goes_on_from_call_to_call(tmp_path):
+    with BagWriter(tmp_path / 'bag') as writer:
+        writer.write_streams([servo_stream()])
+        writer.write_streams([servo_stream()])
+    numbers = [message.sequence for message in open_bag(tmp_path / 'bag').stored_messages()]
+    assert sorted(numbers) == list(range(1, 6001))
+
+
 def test_a_place_that_cannot_be_written_is_one_clear_error(tmp_path):
     (tmp_path / 'file').write_text('')
     with pytest.raises(BagError, match='cannot be created'):

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from endoscope_core.rig import shipped_rig
-from endoscope_core.safety import CommandGate, CommandLimits, Refusal
+from endoscope_core.safety import BendingRange, CommandGate, CommandLimits, Refusal, keep_within
 
 MS = 1_000_000
 LIMITS = CommandLimits(1.0, max_speed=10.0, max_step=0.2)
@@ -193,6 +193,16 @@ def test_an_allowance_is_spent_once():
         if gate.check(20 * k * MS, (wanted, 0.0), (500 + k) * MS, HERE) is None:
             way, last = way + abs(wanted - last), wanted
     assert way <= 10.0 * (0.097 + 0.02)
+
+
+def test_a_stream_at_rest_saves_nothing_up_for_a_leap():
+    gate = gate_after(1000)
+    assert gate.check(1001 * MS, (0.5, 0.0), 1501 * MS, HERE) is Refusal.RATE
+
+
+def test_where_an_angle_is_cut_its_velocity_is_zero():
+    ranges = [BendingRange(-0.2, 0.3)] * 2
+    assert keep_within(ranges, (0.4, 0.1), (1.0, 1.0)) == ((0.3, 0.1), (0.0, 1.0))
 
 
 def test_reset_forgets_the_stream_but_not_the_counts():

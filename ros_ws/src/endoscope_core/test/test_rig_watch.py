@@ -74,6 +74,8 @@ def test_a_cell_that_reads_too_much_is_told_with_its_part_and_time():
     assert alarm.since == pytest.approx(CHANGED_AT, abs=3.0)
     assert alarm.parts == (Part.CELL,)
     assert alarm.change == 'gain of the negative cell'
+    # What has changed is not learnt as the rig's own.
+    assert [joint.test.learning for joint in watch.joints] == [False]
     assert alarm.margin > 1.0
 
 
