@@ -59,6 +59,11 @@ class _Client(GraphClient):
             super().hear()
 
 
+def is_calibrated(calibration: Health | None) -> bool:
+    """Whether the last calibration has found a class: one that was aborted or refused has not."""
+    return calibration is not None and calibration.level == 0
+
+
 def identified(calibration: Health | None) -> bool:
     """Whether a calibration has found the plant of each joint, and so how far it can be bent."""
     return calibration is not None and any(key.startswith(REACH) for key in calibration.values)

@@ -10,7 +10,7 @@ import msgspec
 
 from endoscope_console.alarms import Alarm, Level
 from endoscope_console.command import SLOWEST_HZ
-from endoscope_console.graph_side import GraphSide
+from endoscope_console.graph_side import GraphSide, is_calibrated
 from endoscope_console.operations import Operations
 from endoscope_console.teleop.lease import UNATTENDED_NS
 from endoscope_console.teleop.operator import STATE_NS, DeadManState, Reason
@@ -216,7 +216,7 @@ class View:
                 Alarm('dead_man', Level.MEDIUM, f'the dead-man was released: {reason}'),
             ),
             (
-                client.calibration is None and not silent,
+                not is_calibrated(client.calibration) and not silent,
                 Alarm('calibration', Level.LOW, 'not calibrated'),
             ),
             (

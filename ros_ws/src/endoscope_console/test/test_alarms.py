@@ -3,8 +3,10 @@
 import pytest
 
 from endoscope_console.alarms import Alarm, Alarms, Level
+from endoscope_console.graph_side import is_calibrated
 from endoscope_console.view import busy
 from endoscope_core.errors import EndoscopeError
+from endoscope_nodes.client.graph_listener import Health
 
 FAULT = Alarm('fault', Level.HIGH, 'a wire is over its ceiling', latched=True)
 TRACKER = Alarm('tracker', Level.MEDIUM, 'the tracker is silent')
@@ -49,3 +51,9 @@ def test_a_busy_machine_says_by_how_much_and_what_to_do():
         f'{slower}'
     )
     assert busy(3.0, 1, None, 10) == f'the machine is too busy (load 3 on 1 core): {close}'
+
+
+def test_a_calibration_that_was_aborted_is_none():
+    assert not is_calibrated(None)
+    assert not is_calibrated(Health(2, 'aborted: a tension', {'step': 'recording'}, 1, 1))
+    assert is_calibrated(Health(0, 'class 70 deg', {'class_deg': '70'}, 1, 1))

@@ -224,14 +224,15 @@ export class Operate {
     const { mine } = this.app;
     const { calibration = {}, compensator = {}, recorder = {} } = state;
     const { running, step, progress, result } = calibration;
+    const known = isCalibrated(state);
     toggle($('calibration-progress'), 'hidden', !running);
     if (running) $('calibration-progress').value = progress ?? 0;
     let text = 'Not calibrated yet.';
     if (running) text = `${step || 'calibrating'}, ${Math.round(100 * (progress ?? 0))} %`;
     else if (result) text = result.message || 'calibrated';
     write($('calibration-text'), text);
-    write($('class'), result ? `${deg(result.class_deg)} (${Math.round(100 * (result.probability ?? 0))} %)` : '–');
-    write($('size'), result ? deg(result.size_deg, 1) : '–');
+    write($('class'), known ? `${deg(result.class_deg)} (${Math.round(100 * (result.probability ?? 0))} %)` : '–');
+    write($('size'), known ? deg(result.size_deg, 1) : '–');
     write($('interval'), result && Number.isFinite(result.low_deg) ? `${deg(result.low_deg, 1)} and ${deg(result.high_deg, 1)}` : '–');
     const select = $('compensator');
     const modes = this.app.modes;
