@@ -96,7 +96,7 @@ def test_an_order_is_known_by_codes_whatever_is_said_of_it(graph, monkeypatch):
     calibration = graph.nodes['calibration']
     tell = calibration._tell
     monkeypatch.setattr(calibration, '_tell', lambda last, code='': tell(f'so: {last}', code))
-    assert go_home(graph, lambda: None) == 'so: home reached'
+    assert go_home(graph, lambda: None).startswith('so: home reached')
     # The one before, which ended well, is latched.
     with pytest.raises(GraphError, match=r'so: aborted while .*: the motion session has'):
         go_home(graph, lambda: graph.command('pause'))

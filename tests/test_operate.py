@@ -91,7 +91,9 @@ def test_calibrate_shows_progress_and_ends_with_class_size_and_reach(graph):
     assert said['calibration']['message'] == lines[0]
     assert said['calibration']['session'] == graph.session
     assert said['compensator']['message'].startswith('bouc_wen by ')
-    assert operate(graph, 'home') == (0, 'home reached')
+    status, out = operate(graph, 'home')
+    assert status == 0
+    assert out.startswith('home reached: motors at zero; the tip is at ')
 
 
 def test_a_calibration_that_is_ended_by_a_pause_says_so(graph):

@@ -327,7 +327,7 @@ class CalibrationNode(EndoscopeNode):
         away = {name: x for name, x in zip(names.MOTORS, shafts, strict=False) if abs(x) > TOLD_RAD}
         self._run = None
         if shafts and not away:
-            self._tell('home reached')
+            self._tell(self._at_home())
             return
         self._aborts += 1
         where = ' and '.join(f'{name} at {x:.3f} rad' for name, x in away.items())
@@ -336,6 +336,14 @@ class CalibrationNode(EndoscopeNode):
             OrderCode.NOT_REACHED,
         )
         self.get_logger().error(self._last)
+
+    def _at_home(self) -> str:
+        """What home is: by its friction the tube holds the tip where the wires left it."""
+        bending = self._pose.bending()
+        if not self._pose.tracks or bending is None:
+            return 'home reached: motors at zero'
+        furthest = max(np.degrees(np.abs(bending)))
+        return f'home reached: motors at zero; the tip is at {furthest:.0f} deg, the tube holds it'
 
     def _refuse(self, reason: str) -> None:
         self._run = None
