@@ -342,28 +342,6 @@ def test_recording_is_begun_and_ended(rig):
         assert 'there is no recording' in refused['why']
 
 
-class Device:
-    """A gamepad on the topic joy."""
-
-    def __init__(self, rig) -> None:
-        self._rig = rig
-        self._sender = rig.client.node.create_publisher(Joy, 'joy', EVENT)
-        self.buttons = [0] * 11
-        self.axes = [0.0, 0.0]
-
-    def until(self, condition, what) -> None:
-        """Repeat what it says until something has come true."""
-
-        def repeat() -> bool:
-            self._sender.publish(Joy(axes=self.axes, buttons=self.buttons))
-            return condition()
-
-        self._rig.until(repeat, what)
-
-    def close(self) -> None:
-        self._rig.client.node.destroy_publisher(self._sender)
-
-
 def test_a_recording_is_explained_and_its_report_opens(rig):
     bags = rig.folder / 'bags'
     bags.mkdir(exist_ok=True)
@@ -426,38 +404,6 @@ def test_an_experiment_of_an_earlier_explanation_is_played_while_one_holds_on(ri
         assert not rig.setting('master.hold_to_play')
         assert rig.setting('master.command_file') == ''
         assert rig.wanted[-1] == pytest.approx(bending[-1], abs=0.005)
-
-
-def test_a_gamepad_on_the_topic_joy_obeys_the_same_rules(rig):
-    device = Device(rig)
-    try:
-        with rig.page() as page:
-            rig.client.ask('enable')
-            device.buttons[5] = 1
-            rig.until(lambda: page.state, 'a first state')
-            device.until(lambda: page.state['lease']['holder'] == 'joy', 'its lease')
-            # The button that claimed is no grip.
-            device.until(lambda: rig.handle_senders() == ['console_web'], 'the sender')
-            assert page.dead_man == 'OPEN'
-            assert not page.order('claim')['ok']
-            rig.wanted.clear()
-            while abs(moved(rig)[0]) < FAR:
-                # A busy machine may miss a grip, which has to be let go then and taken again.
-                device.buttons[5], device.axes[0] = 0, 0.0
-                device.until(lambda: page.dead_man == 'READY', 'hands off')
-                device.buttons[5], device.axes[0] = 1, 0.8
-                device.until(lambda: page.dead_man != 'READY', 'the grip')
-                device.until(
-                    lambda: abs(moved(rig)[0]) > FAR or page.dead_man != 'ENGAGED', 'motion'
-                )
-            device.buttons[5] = 0
-            device.until(lambda: page.dead_man != 'ENGAGED', 'the release')
-            assert rig.stands()
-            device.buttons[8] = 1
-            device.until(lambda: rig.client.state == 'PAUSED', 'the pause')
-            assert page.order('claim', take=True)['ok']
-    finally:
-        device.close()
 
 
 def test_a_killed_server_moves_nothing_on(rig):

@@ -12,9 +12,6 @@ _EPILOG = """\
 The address that is printed carries a token: who has it may operate. It is for this machine alone;
 another one is let in by --host with an address of this machine, which needs a certificate. Ctrl-C
 ends the page and, where this command started it, the graph.
-
-A device of the topic joy (joy_node, in the namespace of the graph) operates by the same rules as a
-page. It has to repeat itself at least 20 times a second: autorepeat_rate 50.
 """
 
 
@@ -85,14 +82,6 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         default=Path('bags'),
         metavar='DIR',
         help='recordings that can be explained, and where that goes (default: %(default)s)',
-    )
-    parser.add_argument(
-        '--joy',
-        action='append',
-        default=[],
-        metavar='NAME=VALUE',
-        help='a parameter of the topic joy, by the names of teleop_twist_joy: enable_button=5, '
-        'axis_angular.bend_x=0, pause_button=8, ...',
     )
     parser.add_argument(
         '--rate',

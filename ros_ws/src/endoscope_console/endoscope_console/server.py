@@ -22,7 +22,6 @@ from endoscope_console.access import REPORTS, Admission, Gate, Tokens
 from endoscope_console.clients import HELLO_S, ORDERS_AT_ONCE, Client, Clients, Kind
 from endoscope_console.explanations import REPORT_FILE
 from endoscope_console.graph_side import GraphSide
-from endoscope_console.joy import JoyHand
 from endoscope_console.operations import Operations
 from endoscope_console.orders import HALTS, MalformedOrderError, State, read_hello, read_order
 from endoscope_console.pictures import SIGNALS
@@ -37,8 +36,6 @@ from endoscope_pages import ASSETS
 PAGE = Path(__file__).with_name('page')
 _SERVED = ('.css', '.html', '.js', '.svg')
 _UNWATCHED_NS = 100_000_000
-_JOY_S = 0.01
-_JOY_SOUGHT_S = 0.5
 _MALFORMED, _AGAIN, _TOO_LARGE = 1008, 1013, 1009
 
 
@@ -50,7 +47,6 @@ class Console:
     operations: Operations
     clients: Clients
     view: View
-    joy: JoyHand
     tokens: Tokens  # who may do what
     rig: Rig  # whose limits and measures a page is told
     counts: Counter[str]  # of what was refused and dropped
@@ -244,15 +240,6 @@ class Console:
             watched = watching or self.operations.lease.holder
             due_ns = max(due_ns + (period_ns if watched else _UNWATCHED_NS), now_ns)
             await asyncio.sleep((due_ns - time.monotonic_ns()) * 1e-9)
-
-    async def hear_joy(self) -> None:
-        """Take the topic of a gamepad while there is one, until cancelled."""
-        while True:
-            if self.joy.connected:
-                self.joy.turn(time.monotonic_ns(), time.time_ns())
-                await asyncio.sleep(_JOY_S)
-            else:
-                await asyncio.sleep(_JOY_SOUGHT_S)
 
 
 def _files(folder: Path, below: str) -> dict[str, Path]:

@@ -19,7 +19,6 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import uvicorn
-import yaml
 
 from endoscope_console.access import Admission, Tokens
 from endoscope_console.alarms import Alarms
@@ -30,12 +29,10 @@ from endoscope_console.connections import limited
 from endoscope_console.explanations import Explanations
 from endoscope_console.graph_side import GraphSide, graph_side
 from endoscope_console.investigations import Investigations
-from endoscope_console.joy import JoyHand
 from endoscope_console.operations import Operations
 from endoscope_console.orders import LARGEST_BYTES
 from endoscope_console.server import Console
-from endoscope_console.teleop.joy_mapping import JoyMapping
-from endoscope_console.teleop.pad import PadHandle
+from endoscope_console.teleop.pad import SPEEDS, PadHandle
 from endoscope_console.view import View
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.rig import Rig, load_rig
@@ -125,7 +122,6 @@ class _Graph:
 def serve(args: argparse.Namespace) -> int:
     """Serve the page until a signal asks to end; 0."""
     rig = load_rig(args.rig)
-    mapping = JoyMapping(_joy_parameters(args.joy))
     tokens = Tokens.of_file(args.token_file) if args.token_file else Tokens.new()
     _check_privacy(args)
     listening = _listen(args.host, args.port)
@@ -141,7 +137,7 @@ def serve(args: argparse.Namespace) -> int:
             seen = stack.enter_context(viewers(args.namespace, args.viewers_port))
             print(f'viewers read  {seen}')
         stack.callback(started.end)
-        asyncio.run(_serve(args, listening, graph, started, rig, mapping, tokens))
+        asyncio.run(_serve(args, listening, graph, started, rig, tokens))
     return 0
 
 
@@ -151,7 +147,6 @@ async def _serve(
     graph: GraphSide,
     started: _Graph,
     rig: Rig,
-    mapping: JoyMapping,
     tokens: Tokens,
 ) -> None:
     counts: Counter[str] = Counter()
@@ -160,18 +155,16 @@ async def _serve(
     explanations = Explanations(args.bags, background)
     investigations = Investigations(args.bags, explanations, background)
     limits = (rig.joints.hand_speed,) * len(JOINTS)
-    with Beat(graph.client.node, PadHandle(len(JOINTS), mapping.speeds, limits)) as beat:
+    with Beat(graph.client.node, PadHandle(len(JOINTS), (SPEEDS,) * len(JOINTS), limits)) as beat:
         operations = Operations(
             graph, beat, clients, explanations, investigations, Alarms(), counts
         )
         view = View(operations, rig, counts, args.rate)
-        joy = JoyHand(graph, operations, mapping)
         console = Console(
             graph,
             operations,
             clients,
             view=view,
-            joy=joy,
             tokens=tokens,
             rig=rig,
             counts=counts,
@@ -189,7 +182,6 @@ async def _serve(
         answering = asyncio.create_task(server.serve(sockets=[listening]))
         others = {
             asyncio.create_task(console.make_pictures()),
-            asyncio.create_task(console.hear_joy()),
             asyncio.create_task(_announce(args, address, tokens, graph, started)),
             asyncio.create_task(_asked(stop)),
         }
@@ -203,7 +195,6 @@ async def _serve(
             for task in others:
                 task.cancel()
             await asyncio.wait(others)
-            joy.close()
 
 
 async def _asked(stop: asyncio.Event) -> None:
@@ -344,16 +335,3 @@ def _address(args: argparse.Namespace, listening: socket.socket) -> str:
     host = f'[{args.host}]' if ':' in args.host else args.host
     port = listening.getsockname()[1]
     return f'{scheme}://{host}' + (f':{port}' if port != usual else '')
-
-
-def _joy_parameters(given: Iterable[str]) -> dict[str, Any]:
-    parameters = {}
-    for text in given:
-        name, found, value = text.partition('=')
-        if not found:
-            raise EndoscopeError(f'--joy {text}: give NAME=VALUE')
-        try:
-            parameters[name] = yaml.safe_load(value)
-        except yaml.YAMLError as error:
-            raise EndoscopeError(f'--joy {text}: {value!r} is not a value') from error
-    return parameters

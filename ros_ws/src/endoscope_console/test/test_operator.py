@@ -248,15 +248,6 @@ def test_the_clutch_may_be_held_for_a_motion_that_waits_for_it():
     assert page.dead_man.reason is Reason.SOURCE
 
 
-def test_whoever_holds_a_device_need_not_look_at_a_page():
-    page = Page()
-    page.draws = False
-    page.turn(400)
-    page.engage(source=Source.JOY, seen=0)
-    page.go_on(400, seen=0)
-    assert page.dead_man.engaged
-
-
 def test_nothing_is_engaged_before_anything_was_heard():
     dead_man = OperatorDeadMan()
     dead_man.turn(0, Conditions('c1', True, source='master', pictures=((0, 0),)))

@@ -79,7 +79,7 @@ class AnOperator(RuleBasedStateMachine):
                 (Reason.STATE, not said.state_enabled or page.state_age_ns > 3500 * MS),
                 (Reason.CALIBRATION, said.calibrating),
                 (Reason.SOURCE, said.source != 'master' and not said.playing),
-                (Reason.BLIND, frame.source != Source.JOY and not sees),
+                (Reason.BLIND, not sees),
             )
             if holds
         }
@@ -212,7 +212,7 @@ class AnOperator(RuleBasedStateMachine):
             self.hear(self.page.frame())
             self.turn(20)
 
-    @rule(source=st.sampled_from([Source.KEYBOARD, Source.GAMEPAD, Source.JOY]))
+    @rule(source=st.sampled_from([Source.KEYBOARD, Source.GAMEPAD]))
     def the_operator_takes_hold(self, source):
         page = self.page
         page.hand = replace(page.hand, pressed=False, visible=True, focused=True, source=source)

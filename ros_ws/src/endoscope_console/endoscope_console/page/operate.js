@@ -215,7 +215,7 @@ export class Operate {
     write($('scale-value'), Number.isFinite(scale) ? String(Number(scale.toPrecision(2))) : '–');
     if (Number.isFinite(scale) && performance.now() > this._sliding) $('scale').value = String(nearestScale(scale));
     let device = this.app.touch ? '' : 'keys: arrows, or W A S D';
-    if (deadMan?.gamepadUnknown) device = 'unsupported gamepad mapping: use the topic joy';
+    if (deadMan?.gamepadUnknown) device = 'unsupported gamepad mapping: use another gamepad or browser';
     else if (deadMan?.hasGamepad) device = `gamepad: hold RB; stick asks for ${hands.modes.gamepad}`;
     write($('device'), device);
   }

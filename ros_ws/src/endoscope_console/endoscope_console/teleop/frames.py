@@ -35,7 +35,6 @@ class Source(IntEnum):
     KEYBOARD = 0
     POINTER = 1
     GAMEPAD = 2
-    JOY = 3
 
 
 @dataclass(frozen=True)
@@ -93,8 +92,7 @@ def decode_input(data: bytes) -> InputFrame:
         raise MalformedFrameError(f'an input frame is of kind {INPUT}, not {kind}')
     if flags & ~_KNOWN_FLAGS:
         raise MalformedFrameError(f'an input frame has no flags {flags & ~_KNOWN_FLAGS:#x}')
-    # Nobody speaks for the topic but the topic.
-    if source >= Source.JOY:
+    if source not in tuple(Source):
         raise MalformedFrameError(f'a page has no source {source}')
     if not (abs(t) <= _LAST_S and math.isfinite(x) and math.isfinite(y)):
         raise MalformedFrameError(f'no time in s and two angles: {t}, {x}, {y}')

@@ -260,8 +260,7 @@ class OperatorDeadMan:
         follows = conditions.source == FOLLOW_THE_HANDLE or conditions.playing
         if not follows or (self.engaged and of_master != self._of_master):
             return Reason.SOURCE
-        # Whoever holds a device of the topic `joy` need not look at a page.
-        if frame.source != Source.JOY and not _sees(frame.seen, now_ns, conditions.pictures):
+        if not _sees(frame.seen, now_ns, conditions.pictures):
             return Reason.BLIND
         return None
 

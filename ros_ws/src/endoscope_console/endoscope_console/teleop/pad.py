@@ -9,6 +9,8 @@ _RAMP_NS = 20_000_000
 # A beat that comes later than a command lives makes up for no more than this.
 _LONGEST_NS = 100_000_000
 _NS = 1e-9
+SPEEDS = (0.5, 1.0)
+"""Of a joint at full deflection, by the usual and by the fast dead-man, rad/s."""
 
 
 class PadHandle:
