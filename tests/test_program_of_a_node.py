@@ -72,7 +72,7 @@ def wait_for_line(process, words):
 
 
 @pytest.mark.parametrize(
-    ('name', 'number'), zip(('graph', 'recorder', 'recorder'), STOPPING, strict=True)
+    ('name', 'number'), list(zip(('graph', 'recorder', 'recorder'), STOPPING, strict=True))
 )
 def test_a_signal_while_it_starts_is_one_line(tmp_path, name, number):
     process = start(name, '--ros-args', '-p', f'bag:={tmp_path / "bag"}')
