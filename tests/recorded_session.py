@@ -6,7 +6,7 @@ from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
-from probed_runtime import ProbedRuntime
+from probed_graph import ProbedRuntime
 from rclpy.context import Context
 from sensor_msgs.msg import JointState, Joy
 from std_msgs.msg import Header, String

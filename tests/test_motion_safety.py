@@ -84,55 +84,53 @@ def test_load_cells_unplugged_are_a_fault_that_torque_off_leaves_at_any_time():
         assert graph.command('enable') == 'ENABLED'
 
 
-def test_enabling_waits_for_the_slave():
+def test_state_commands_out_of_place_or_before_the_slave_is_heard_change_nothing():
     with SimulatedGraph() as graph:
         assert graph.command('enable') == 'DISABLED'
         graph.advance(0.2)
-        assert graph.command('enable') == 'ENABLED'
-
-
-def test_state_commands_out_of_place_change_nothing():
-    with SimulatedGraph() as graph:
-        graph.advance(0.1)
         assert graph.command('resume') == 'DISABLED'
         assert graph.command('fly') == 'DISABLED'
         graph.advance(1.1)
         assert 'fly' in graph.reported('supervisor: operating state')['last refusal']
+        assert graph.command('enable') == 'ENABLED'
 
 
 # ---- commands of an outside program
 
 
-@pytest.mark.parametrize(
-    ('changes', 'reason'),
-    [
-        ({'position': [math.nan, 0.0]}, 'not finite'),
-        ({'velocity': [0.0, math.inf]}, 'not finite'),
-        ({'ahead_ns': -300_000_000}, 'stamp not increasing'),
-        ({'ahead_ns': 10_000_000_000}, 'stamped in the future'),
-        ({'ahead_ns': 1_000_000_000 * 86_400 * 365}, 'stamped in the future'),
-        ({'name': ['bend_x', 'elbow']}, 'malformed'),
-        ({'name': ['bend_x'], 'position': [0.0]}, 'malformed'),
-        ({'position': [0.0]}, 'malformed'),
-        ({'name': ['bend_x', 'bend_y'], 'effort': [0.0] * 1_200_000}, 'malformed'),
-        ({'position': [3.0, 0.0]}, 'out of range'),
-        ({'position': [0.8, 0.0]}, 'too fast'),
-        ({'session': ''}, 'not of this motion session'),
-        ({'session': 'session-1'}, 'not of this motion session'),
-    ],
+BAD = (
+    ({'position': [math.nan, 0.0]}, 'not finite'),
+    ({'velocity': [0.0, math.inf]}, 'not finite'),
+    ({'ahead_ns': -300_000_000}, 'stamp not increasing'),
+    ({'ahead_ns': 10_000_000_000}, 'stamped in the future'),
+    ({'ahead_ns': 1_000_000_000 * 86_400 * 365}, 'stamped in the future'),
+    ({'name': ['bend_x', 'elbow']}, 'malformed'),
+    ({'name': ['bend_x'], 'position': [0.0]}, 'malformed'),
+    ({'position': [0.0]}, 'malformed'),
+    ({'name': ['bend_x', 'bend_y'], 'effort': [0.0] * 1_200_000}, 'malformed'),
+    ({'position': [3.0, 0.0]}, 'out of range'),
+    ({'position': [0.8, 0.0]}, 'too fast'),
+    ({'session': ''}, 'not of this motion session'),
+    ({'session': 'session-1'}, 'not of this motion session'),
 )
-def test_a_bad_command_is_refused_counted_and_changes_nothing(foreign, master, changes, reason):
-    master.move(0.4)
+
+
+def test_a_bad_command_is_refused_counted_and_changes_nothing(foreign, master):
+    gate = foreign.nodes['compensator'].gate
     moved = Moved(foreign)
-    before = foreign.nodes['compensator'].gate.refused[reason]
-    master.tick(**changes)
-    assert moved.goals == []
-    master.move(0.2)
-    foreign.advance(0.05)
+    for changes, reason in BAD:
+        # Not as far as the joints reach, all in all.
+        master.move(0.1)
+        foreign.advance(TICK_S)
+        before, obeyed = gate.refused[reason], gate.accepted
+        moved.clear()
+        master.tick(**changes)
+        assert moved.goals == [], changes
+        assert (gate.refused[reason], gate.accepted) == (before + 1, obeyed), changes
+        master.move(0.06)
+        assert len(moved.goals) >= ticks(0.06) - 1, changes
+        assert moved.largest_step < TICK_S, changes
     assert foreign.state == 'ENABLED'
-    assert foreign.nodes['compensator'].gate.refused[reason] == before + 1
-    assert len(moved.goals) == ticks(0.2)
-    assert moved.largest_step < TICK_S
 
 
 def test_the_order_of_the_joints_does_not_matter(foreign, master):
@@ -344,7 +342,7 @@ def test_a_clutch_held_through_an_interrupted_calibration_moves_nothing():
         assert moved.largest_step < 0.002
 
 
-@pytest.mark.parametrize('rate', [50, 100, 250])
+@pytest.mark.parametrize('rate', [50, 250])
 def test_a_handle_of_any_rate_is_followed_smoothly(rate):
     with run(overrides={'master': {'source': 'master'}}) as graph:
         commands = graph.listen(SLAVE_COMMAND)
