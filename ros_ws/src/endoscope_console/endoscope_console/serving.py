@@ -19,13 +19,13 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import uvicorn
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from endoscope_console.access import Admission, Tokens
 from endoscope_console.alarms import Alarms
 from endoscope_console.background import Background
 from endoscope_console.beat import Beat
-from endoscope_console.clients import Clients
-from endoscope_console.connections import limited
+from endoscope_console.clients import OF_A_KIND, UNANSWERED, Clients
 from endoscope_console.explanations import Explanations
 from endoscope_console.graph_side import GraphSide, graph_side
 from endoscope_console.investigations import Investigations
@@ -54,6 +54,10 @@ _ANSWERS_S = 1.5
 _LOOK_S = 0.1
 _ENDS_S = 20.0
 _DROPPED_S = 2
+_SEND_BUFFER = 16_384
+_WRITE_BUFFER = 4096
+CONNECTIONS = 3 * OF_A_KIND + 2 * UNANSWERED
+"""At once: both sockets of each page, and requests for files."""
 _NOT_UNASKED = "--graph '-p autostart:=false' leaves it to you"
 _STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -172,7 +176,7 @@ async def _serve(
         )
         address = _address(args, listening)
         admission = Admission(frozenset((address, *args.origin)), args.allow_no_origin)
-        server = _Server(_configuration(args, console, admission, counts))
+        server = _Server(_configuration(args, console, admission))
         stop = asyncio.Event()
         for number in _STOPPING:
             asyncio.get_running_loop().add_signal_handler(number, stop.set)
@@ -251,14 +255,29 @@ async def _until_whole(graph: GraphSide, started: _Graph) -> None:
         await asyncio.sleep(_LOOK_S)
 
 
+class _Sockets(WebSocketsSansIOProtocol):
+    """Sockets that hold little back: a slow reader is dropped pictures, not sent old ones."""
+
+    def connection_made(self, transport: Any) -> None:
+        super().connection_made(transport)
+        # What waits in the kernel and in the transport is already old when it is read.
+        transport.set_write_buffer_limits(high=_WRITE_BUFFER)
+        plain = transport.get_extra_info('socket')
+        plain.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
+
+    def keepalive_timeout(self) -> None:
+        """Let go of who does not answer, and of what waits to be sent to him."""
+        super().keepalive_timeout()
+        self.transport.abort()
+
+
 def _configuration(
-    args: argparse.Namespace, console: Console, admission: Admission, counts: Counter[str]
+    args: argparse.Namespace, console: Console, admission: Admission
 ) -> uvicorn.Config:
-    requests, sockets = limited(counts)
     return uvicorn.Config(
         console.app(admission),
-        http=requests,
-        ws=sockets,
+        ws=_Sockets,
+        limit_concurrency=CONNECTIONS,
         lifespan='off',
         log_config=None,
         log_level='error',
