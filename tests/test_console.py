@@ -5,7 +5,7 @@ import os
 import signal
 import time
 import urllib.request
-from contextlib import closing, suppress
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -16,14 +16,12 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Joy
 from short_bags import PLANT, write_short_bag
 
-from endoscope_bags import open_bag
 from endoscope_console.explanations import EXPERIMENT_FILE, REPORT_FILE
 from endoscope_core.physics import save_plant
 from endoscope_core.signals.command_file import write_command_file
 from endoscope_nodes.client.graph_client import joined_graph
-from endoscope_nodes.client.graph_listener import GraphError
 from endoscope_nodes.client.handle_sender import HandleSender
-from endoscope_nodes.names import CONSOLE_LOG, MASTER_CLUTCH, RECORDER_STOP
+from endoscope_nodes.names import CONSOLE_LOG, MASTER_CLUTCH
 from endoscope_nodes.runtime.private_domain import private_domain
 from endoscope_nodes.runtime.qos import EVENT
 from endoscope_nodes.topics import RECORDED
@@ -328,9 +326,6 @@ def test_orders_are_said_in_the_graph_with_who_gave_them(rig):
 def test_recording_is_begun_and_ended(rig):
     with rig.page() as page:
         page.order('claim')
-        with suppress(GraphError):
-            # On a busy machine the recorder may miss what a sender says before it was found.
-            rig.client.trigger(RECORDER_STOP)
         assert page.order('record', on=True)['ok']
         rig.until(lambda: page.state['recorder']['recording'])
         page.order('record', on=False)
@@ -426,20 +421,13 @@ def test_a_terminated_server_releases_and_gives_back(rig):
     rig.restart()
 
 
-def test_a_graph_that_is_begun_says_that_it_records_and_rests(tmp_path):
-    rig = tmp_path / 'rig.yaml'
-    rig.write_text('recording: {rest: 1.0}\n')
+def test_a_graph_that_is_begun_records_nothing_unasked(tmp_path):
     environment = os.environ | {'ROS_DOMAIN_ID': str(private_domain())}
-    server = Server(tmp_path, environment, '--rig', str(rig))
+    server = Server(tmp_path, environment)
     try:
-        line = server.said('recorder')
-        assert f'recording automatically to {tmp_path}/bags/recording-' in line
-        assert "--graph '-p autostart:=false'" in line
         server.said('ready')
         with Page(server.address, server.token) as page:
-            assert page.wait(lambda: 'at rest' in str(page.state.get('recorder')))
-            assert not page.state['recorder']['recording']
+            assert page.wait(lambda: 'not recording' in str(page.state.get('recorder')))
     finally:
         assert server.end() == 0
-    (bag,) = (tmp_path / 'bags').glob('recording-*')
-    assert open_bag(bag).metadata['endoscope_bags']['ended'] == 'at rest'
+    assert list((tmp_path / 'bags').glob('recording-*')) == []

@@ -40,7 +40,7 @@ def motion(tmp_path):
 
 def graph(rig=None, plant=None, folder=None):
     """All nodes in simulated time."""
-    overrides = {'recorder': {'autostart': False}}
+    overrides = {}
     if plant is not None:
         save_plant(plant, folder / 'slave.yaml')
         overrides['motor_driver'] = {'plant_file': str(folder / 'slave.yaml')}

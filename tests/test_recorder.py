@@ -1,6 +1,5 @@
 """The recorder node: everything published is in the bag, as it was published."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +24,7 @@ from endoscope_bags import BagError, open_bag
 from endoscope_bags.cdr_encoding import encode_clock, encode_joint_state, encode_string
 from endoscope_bags.message_types import message_type
 from endoscope_nodes.nodes.recorder import new_bag
-from endoscope_nodes.runtime.diagnostics import OK, WARN
+from endoscope_nodes.runtime.diagnostics import OK
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import EVENT, LOCK_STEP, RESULT, SENSOR_ASKED, SENSOR_OFFERED
 
@@ -188,93 +187,6 @@ def test_stopping_without_a_recording_is_an_error(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def unasked(folder, monkeypatch, **limits):
-    """A recorder that nobody asked to record, and what says the state of the slave."""
-    monkeypatch.chdir(folder)
-    rig = folder / 'rig.yaml'
-    rig.write_text(f'recording: {json.dumps(limits)}\n')
-    session = RecordedSession(rig_file=str(rig), topics=[SERVO])
-    publisher, state = session.probe.create_publisher(String, STATE, RESULT), String()
-
-    def say(now):
-        state.data = now
-
-    # As the supervisor does: again and again.
-    session.probe.create_timer(0.05, lambda: state.data and publisher.publish(state))
-    return session, say
-
-
-def said_of(session):
-    level, message, values = session.recorder._report()
-    return level, message, values.get('bag')
-
-
-def test_what_nobody_asked_for_ends_at_rest_and_goes_on_with_the_next_session(
-    tmp_path, monkeypatch
-):
-    session, say = unasked(tmp_path, monkeypatch, rest=1.0)
-    with session:
-        servo = session.publisher(JointState, SERVO, SENSOR_OFFERED)
-        servo.publish(encode_joint_state(['a'], 1, position=[1.0]))
-        session.wait_for({SERVO: 1})
-        _, message, first = said_of(session)
-        assert message == 'recording automatically'
-        say('DISABLED')
-        session.wait(lambda: session.recorder.last_report)
-        assert said_of(session) == (OK, 'at rest: records again once the slave is enabled', None)
-        # It is whole while the recorder runs.
-        assert open_bag(first).metadata['endoscope_bags']['ended'] == 'at rest'
-        assert open_bag(first).topics[SERVO].message_count == 1
-        say('ENABLED')
-        session.wait(lambda: said_of(session)[2])
-        second = said_of(session)[2]
-        session.wait(lambda: dict(session.recorder.extra_readers()).get(SERVO))
-        servo.publish(encode_joint_state(['a'], 2, position=[2.0]))
-        # Enabled is no rest, however still the slave is.
-        session.serve(2.5)
-        assert said_of(session)[2] == second != first
-    assert session.runtime.exit_code == 0
-    assert open_bag(second).topics[SERVO].message_count == 1
-
-
-def test_what_a_person_asked_for_is_not_ended_at_rest(tmp_path, monkeypatch):
-    session, say = unasked(tmp_path, monkeypatch, rest=1.0, room=1.0)
-    with session:
-        recorder = session.recorder
-        # Who asks while it records gets a refusal, and what is recorded is theirs.
-        begun, _ = recorder.start_as_asked()
-        assert not begun
-        say('DISABLED')
-        session.serve(3.5)
-        assert said_of(session)[1] == 'recording'
-        recorder.stop_as_asked()
-        say('ENABLED')
-        session.serve(0.5)
-        assert said_of(session) == (OK, 'not recording', None)
-
-
-def test_what_nobody_asked_for_has_little_room_and_its_end_is_a_warning(tmp_path, monkeypatch):
-    session, say = unasked(tmp_path, monkeypatch, room=0.1)
-    with session:
-        servo = session.publisher(JointState, SERVO, SENSOR_OFFERED)
-        noise, names = np.random.default_rng(0), [f'joint_{k}' for k in range(1000)]
-        for _ in range(100):
-            servo.publish(encode_joint_state(names, 1, position=noise.uniform(size=1000)))
-        session.wait(lambda: session.recorder.last_report)
-        level, message, _ = said_of(session)
-        assert level == WARN
-        assert 'has reached 0.1 MB, recording.room of rig.yaml' in message
-        assert '`endoscope operate record start` records' in message
-        say('ENABLED')
-        session.serve(0.5)
-        assert said_of(session)[0] == WARN
-        begun, _ = session.recorder.start_as_asked()
-        assert begun
-        assert said_of(session)[:2] == (OK, 'recording')
-        assert session.recorder.last_report.complete
-    assert session.runtime.exit_code == 0
-
-
 def test_recordings_without_a_name_have_different_ones_within_a_second(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr('time.strftime', lambda how: how.replace('%', ''))
@@ -286,9 +198,16 @@ def test_recordings_without_a_name_have_different_ones_within_a_second(tmp_path,
     assert names[1:] == [f'{names[0]}-2', f'{names[0]}-3']
 
 
-def test_without_room_nothing_is_recorded_unasked(tmp_path, monkeypatch):
-    session, say = unasked(tmp_path, monkeypatch, room=0)
+def test_nothing_is_recorded_unasked(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    session = RecordedSession(topics=[SERVO])
+    state = session.probe.create_publisher(String, STATE, RESULT)
     with session:
-        say('ENABLED')
+        session.wait(state.get_subscription_count)
+        state.publish(String(data='ENABLED'))
         session.serve(0.5)
-    assert [path.name for path in tmp_path.iterdir()] == ['rig.yaml']
+        assert session.recorder._report() == (OK, 'not recording', {})
+        begun, path = session.recorder.start_as_asked()
+        assert begun
+        assert session.recorder._report()[:2] == (OK, 'recording')
+    assert list(tmp_path.glob('bags/recording-*')) == [tmp_path / path]

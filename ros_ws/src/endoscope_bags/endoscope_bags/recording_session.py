@@ -100,12 +100,6 @@ class RecordingSession:
         """Why it has ended early; else empty."""
         return self._full
 
-    @property
-    def size(self) -> int:
-        """Bytes on the disk."""
-        files = [self.path, *self.path.rglob('*')]
-        return sum(file.stat().st_size for file in files if file.is_file())
-
     def add_topic(
         self,
         topic: str,

@@ -14,7 +14,6 @@ import time
 from collections import Counter
 from collections.abc import Iterable
 from contextlib import ExitStack, nullcontext
-from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -37,7 +36,7 @@ from endoscope_console.view import View
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.rig import Rig, load_rig
 from endoscope_nodes.client.graph_client import WHOLE_S
-from endoscope_nodes.client.graph_listener import RECORDER, SUPERVISOR, Health
+from endoscope_nodes.client.graph_listener import RECORDER, SUPERVISOR
 from endoscope_nodes.names import BAG, JOINTS
 from endoscope_nodes.program import NODES, REAL_TIME
 from endoscope_nodes.runtime.runtime import GC_THRESHOLDS, SWITCH_INTERVAL_S
@@ -58,7 +57,6 @@ _SEND_BUFFER = 16_384
 _WRITE_BUFFER = 4096
 CONNECTIONS = 3 * OF_A_KIND + 2 * UNANSWERED
 """At once: both sockets of each page, and requests for files."""
-_NOT_UNASKED = "--graph '-p autostart:=false' leaves it to you"
 _STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -82,15 +80,6 @@ class _Graph:
             self._words += ['-p', f'rig_file:={args.rig.resolve()}']
         self._words += shlex.split(args.graph)
         self._process: subprocess.Popen | None = None
-
-    def recording(self, said: Health) -> str:
-        """Say whether and where it records, and how it would not."""
-        bag = said.values.get(BAG)
-        if bag is None:
-            return said.message
-        if self._process is None:
-            return f'{said.message} to {bag}'
-        return f'{said.message} to {Path(bag).resolve()}; {_NOT_UNASKED}'
 
     async def start_unless_one_answers(self, graph: GraphSide) -> None:
         """Start it, if nobody is there within 1.5 s."""
@@ -229,8 +218,8 @@ async def _announce(
         await asyncio.sleep(_LOOK_S)
     await _until_whole(graph, started)
     recorder = graph.client.health.get(RECORDER)
-    if recorder is not None:
-        print(f'recorder      {started.recording(recorder)}', flush=True)
+    if recorder is not None and BAG in recorder.values:
+        print(f'recorder      {recorder.message} to {recorder.values[BAG]}', flush=True)
     print(f'ready         slave {graph.client.state}; Ctrl-C ends', flush=True)
     while started.ended is None:
         await asyncio.sleep(_LOOK_S)

@@ -66,7 +66,7 @@ TIME, GEAR, REACH, SPEED, CEILING = (
 # What `recorder: events` says there: how many marks it has heard, and its last bag of an event.
 MARKS, LAST_EVENT = 'marks', 'last bag'
 # What `recorder: recording` says there while it records: where, and whether nobody asked for it.
-BAG, AUTOMATIC = 'bag', 'automatic'
+BAG = 'bag'
 # What `watch: rig` says there first, until it can judge.
 LEARNING = 'learning'
 # What `console: commands` says there of a motion that it plays.

@@ -155,7 +155,6 @@ def _graph(args: argparse.Namespace, rig: 'Rig') -> Iterator['GraphClient']:
 
     overrides: dict[str, dict[str, object]] = {
         'motor_driver': {'seed': rig.simulation.seed},
-        'recorder': {'autostart': False},
     }
     if slave is not None:
         overrides['motor_driver']['plant_file'] = str(slave)

@@ -244,6 +244,8 @@ export class Operate {
     toggle($('record'), 'disabled', !this.app.mayRecord());
     set($('record'), 'aria-pressed', String(Boolean(recorder.recording)));
     write($('record'), recorder.recording ? 'Stop recording' : 'Record');
+    // What is enabled and not recorded is offered to be.
+    set($('record'), 'class', this.app.mine && state.operating_state === 'ENABLED' && !recorder.recording ? 'main' : '');
     toggle($('mark'), 'disabled', !this.app.mayRecord());
   }
 
@@ -253,9 +255,11 @@ export class Operate {
     return answer;
   }
 
-  _enable() {
+  async _enable() {
     const command = this.app.state?.operating_state === 'PAUSED' ? 'resume' : 'enable';
-    this._order({ op: 'state', command }, command === 'resume' ? 'Resume' : 'Enable');
+    const name = command === 'resume' ? 'Resume' : 'Enable';
+    const answer = await this._order({ op: 'state', command }, name);
+    if (answer.ok && !this.app.state?.recorder?.recording) this.say(`${name}: done. Nothing is recorded: press Record to keep what follows.`);
   }
 
   async _claim() {

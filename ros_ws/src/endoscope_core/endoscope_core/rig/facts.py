@@ -129,16 +129,6 @@ class DeviceFacts:
 
 
 @dataclass(frozen=True)
-class RecordingFacts:
-    """When a recording ends that nobody asked for, in s and MB."""
-
-    # How long in s the slave has not been enabled by then; its next session begins another one.
-    rest: Annotated[float, within(1.0, 1e6)]
-    # MB of all such recordings in one run of the graph, after which there are no more; 0: none.
-    room: Annotated[float, within(0.0, 1e6)]
-
-
-@dataclass(frozen=True)
 class SimulationFacts:
     """The simulated slave."""
 
@@ -160,7 +150,6 @@ class Rig:
     handle: HandleFacts
     instrument: InstrumentFacts
     devices: DeviceFacts
-    recording: RecordingFacts
     simulation: SimulationFacts
 
     def __post_init__(self) -> None:

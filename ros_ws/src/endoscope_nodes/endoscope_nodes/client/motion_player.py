@@ -182,7 +182,7 @@ class MotionPlayer:
             if left:
                 # The next recording would have the name of this one.
                 before = ''
-            if left or said.values.get(names.AUTOMATIC) == 'True':
+            if left:
                 # Whether it is whole is nothing that this motion depends on.
                 client.call(Trigger, names.RECORDER_STOP, Trigger.Request(), PATIENCE_S)
         after.callback(set_parameters, client, RECORDER_NODE, {'bag': before})

@@ -27,7 +27,6 @@ from endoscope_bags.topic import QosProfile
 from endoscope_core.atomic_output import with_final_names
 from endoscope_core.errors import nearest
 from endoscope_nodes.names import (
-    AUTOMATIC,
     BAG,
     MOTION_SESSION,
     OPERATING_STATE,
@@ -35,7 +34,7 @@ from endoscope_nodes.names import (
     RECORDER_STOP,
 )
 from endoscope_nodes.nodes.event_keeping import EventKeeping
-from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report
+from endoscope_nodes.runtime.diagnostics import ERROR, OK, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
 from endoscope_nodes.runtime.node_parameters import RecorderParameters
@@ -55,7 +54,6 @@ _LOOK_PERIOD_S = 0.1
 _UNTYPED_S = 2.0
 _WATCHED_S = 60.0
 """What is kept at least where the rig is watched: the bag of an alarm begins before the change."""
-_MEGABYTE = 1_000_000
 
 
 @dataclass
@@ -76,16 +74,12 @@ class _Source:
 
 
 class RecorderNode(EndoscopeNode):
-    """Records from ``recorder/start`` (or from the beginning) to ``recorder/stop`` or the end.
+    """Records from ``recorder/start`` to ``recorder/stop`` or the end; a named bag from the start.
 
     In real time a message is recorded with the middleware's stamps of receipt and publication. In
     simulated time both are the tick of ``/clock`` in which it came, so that the same simulation
     gives the same bag. Losses, found as gaps in the publishers' numbers, and a full disk are told
     in the diagnostics, in the bag, and by exit code 1.
-
-    A recording that nobody asked for or named ends once the slave has rested, and the next motion
-    session begins another one, until all of them have taken the rig's ``recording.room``. Whoever
-    calls ``recorder/start`` or ``recorder/stop`` decides alone from then on.
 
     What came in the last seconds is kept in memory whether or not it is recorded. When the slave
     goes to ``FAULT``, or ``recorder/mark`` says something, it and what follows becomes a bag of its
@@ -116,10 +110,6 @@ class RecorderNode(EndoscopeNode):
         self._untyped = list(self._topics)
         self._last_tick_ns = 0
         self._said_loss = 0
-        self._unasked = p.autostart and not p.bag and self.rig.recording.room > 0
-        self._unasked_bytes = 0
-        self._warning = ''
-        self._active_ns = 0
         self.last_report: SessionReport | None = None  # none before the first has ended
         self.serve(RECORDER_START, self.start_as_asked)
         self.serve(RECORDER_STOP, self.stop_as_asked)
@@ -133,12 +123,10 @@ class RecorderNode(EndoscopeNode):
         )
         self.diagnostics.add('recording', self._report)
         self.diagnostics.add('events', self._events.report)
-        if self._unasked:
-            self.ticker.every(1.0, self._end_unasked)
-        if self._unasked or self._events.keeps:
+        if self._events.keeps:
             self.create_subscription(String, OPERATING_STATE, self._on_state, RESULT)
         self._subscribe_untyped()
-        if p.autostart and (p.bag or self._unasked):
+        if p.autostart and p.bag:
             try:
                 self.start()
             except BagError as error:
@@ -158,7 +146,7 @@ class RecorderNode(EndoscopeNode):
             there = with_final_names(str(self._session.path))
             ends = self.operate('record stop')
             raise BagError(f'already recording to {there}: `{ends}` ends that')
-        path = Path(new_bag() if self._unasked else self._bag or new_bag())
+        path = Path(self._bag or new_bag())
         now_ns = self.ticker.now_ns()
         # What came before is no part of it, but what is in force.
         self._collect(now_ns)
@@ -169,13 +157,13 @@ class RecorderNode(EndoscopeNode):
         self.get_logger().info(f'recording to {with_final_names(str(path))}')
         return path
 
-    def stop(self, ended: str = 'on request') -> SessionReport:
+    def stop(self) -> SessionReport:
         """End the recording and say how it went; BagError if there is none."""
         if self._session is None:
             raise BagError('not recording')
         self._collect(self.ticker.now_ns())
         session, self._session = self._session, None
-        report = self.last_report = session.close(ended)
+        report = self.last_report = session.close('on request')
         silent = [topic for topic, count in report.counts.items() if not count] + self._untyped
         if silent and (self._asked_for or not report.message_count):
             self.get_logger().warning(f'no message came on {", ".join(silent)}')
@@ -201,15 +189,13 @@ class RecorderNode(EndoscopeNode):
 
     def start_as_asked(self) -> tuple[bool, str]:
         """Begin a recording that is the asker's; whether it has begun, and where or why not."""
-        self._unasked, self._warning = False, ''
         try:
             return True, with_final_names(str(self.start()))
         except BagError as error:
             return False, str(error)
 
     def stop_as_asked(self) -> tuple[bool, str]:
-        """End the recording, and begin none again unasked; whether it is whole, and how it went."""
-        self._unasked = False
+        """End the recording; whether it is whole, and how it went."""
         try:
             report = self.stop()
         except BagError as error:
@@ -218,38 +204,6 @@ class RecorderNode(EndoscopeNode):
 
     def _on_state(self, message: String) -> None:
         self._events.on_state(message.data)
-        enabled = message.data == 'ENABLED'
-        if enabled or not self._active_ns:
-            self._active_ns = self.ticker.monotonic_ns()
-        if enabled and self._unasked and self._session is None:
-            try:
-                self.start()
-            except BagError as error:
-                self._give_up(str(error))
-
-    def _end_unasked(self) -> None:
-        """End a recording that nobody asked for, at rest and where there is no room for more."""
-        session = self._session
-        if not self._unasked or session is None:
-            return
-        limits = self.rig.recording
-        full = self._unasked_bytes + session.size >= limits.room * _MEGABYTE
-        # Where no supervisor has been heard, nobody knows of rest.
-        idle_ns = self.ticker.monotonic_ns() - self._active_ns if self._active_ns else 0
-        if not full and idle_ns < limits.rest * _SECOND:
-            return
-        self.stop('no room for more' if full else 'at rest')
-        self._unasked_bytes += session.size
-        if full:
-            self._give_up(
-                f'what was recorded automatically has reached {limits.room:g} MB, '
-                'recording.room of rig.yaml'
-            )
-
-    def _give_up(self, why: str) -> None:
-        self._unasked = False
-        self._warning = f'not recording: {why}; `{self.operate("record start")}` records'
-        self.get_logger().warning(self._warning)
 
     def _subscribe_untyped(self) -> None:
         """Subscribe to the topics whose type is known by now."""
@@ -390,15 +344,10 @@ class RecorderNode(EndoscopeNode):
 
     def _report(self) -> Report:
         if self._session is None:
-            if self._warning:
-                return WARN, self._warning, {}
-            if self._unasked:
-                return OK, 'at rest: records again once the slave is enabled', {}
             return OK, 'not recording', {}
         report = self._session.report()
         values: dict[str, object] = {
             BAG: with_final_names(str(report.path)),
-            AUTOMATIC: self._unasked,
             'messages': report.message_count,
             'lost': report.lost_count,
         }
@@ -408,7 +357,7 @@ class RecorderNode(EndoscopeNode):
             return ERROR, report.full, values
         if report.lost_count:
             return ERROR, f'{report.lost_count} messages lost', values
-        return OK, 'recording automatically' if self._unasked else 'recording', values
+        return OK, 'recording', values
 
 
 def new_bag() -> str:

@@ -320,7 +320,9 @@ class RecorderParameters:
     topics: tuple[str, ...] = parameter(
         RECORDED, 'topics to record, relative ones in the namespace of the node'
     )
-    autostart: bool = parameter(True, 'record from the start instead of on recorder/start')
+    autostart: bool = parameter(
+        True, 'record from the start where a bag is named, instead of on recorder/start'
+    )
     keep: float = parameter(
         20.0,
         'what came last is kept in memory for so long, for the bag of a fault or a mark, and for '
