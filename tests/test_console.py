@@ -1,11 +1,13 @@
-"""The server of the console, operated by pages without a browser: what moves, and what does not."""
+"""The server of the console, operated by pages without a browser and attacked by some."""
 
 import json
 import os
+import random
 import signal
+import socket
 import time
 import urllib.request
-from contextlib import closing
+from contextlib import ExitStack, closing, suppress
 
 import numpy as np
 import pytest
@@ -15,8 +17,12 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Joy
 from short_bags import PLANT, write_short_bag
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
 
+from endoscope_console.clients import FRAMES_A_SECOND, UNANSWERED
 from endoscope_console.explanations import EXPERIMENT_FILE, REPORT_FILE
+from endoscope_console.teleop.frames import InputFrame, encode_input
 from endoscope_core.physics import save_plant
 from endoscope_core.signals.command_file import write_command_file
 from endoscope_nodes.client.graph_client import joined_graph
@@ -28,6 +34,9 @@ from endoscope_nodes.topics import RECORDED
 
 FAR = 0.06
 BUSY = ('silent', 'late', 'stalled', 'blind')
+_PATIENCE_S = 60.0
+_TEN_MEGABYTES = 10_000_000
+_FRAME = InputFrame(False, False, True, True, False, 0, 1, 0, 0, 0.0, 0.0, 0.0)
 
 
 @pytest.fixture(scope='module')
@@ -163,44 +172,6 @@ def test_silence_of_the_page_ends_the_grip_and_then_the_lease(rig):
         assert rig.stands()
 
 
-@pytest.mark.parametrize('gone', [{'visible': False}, {'focused': False}])
-def test_a_page_that_nobody_looks_at_moves_nothing(rig, gone):
-    with rig.page() as page:
-        ended(rig, page, lambda: page.does(**gone), 'hidden', 'unfocused')
-
-
-def test_who_does_not_see_moves_nothing(rig):
-    with rig.page() as page:
-
-        def shuts_its_eyes():
-            page.sends = False
-            for _ in range(40):
-                page.send_frame(seen=1)
-                time.sleep(0.02)
-
-        ended(rig, page, shuts_its_eyes, 'blind')
-
-
-def test_a_closed_page_moves_nothing_and_gives_the_controls_up(rig):
-    with rig.page() as watching:
-        with rig.page() as page:
-            follows(rig, page)
-        stopped(rig, watching)
-        rig.until(lambda: watching.state['lease']['holder'] == '')
-        assert watching.state['dead_man']['reason'] in ('closed', *BUSY)
-
-
-def test_late_frames_of_a_grip_that_ended_move_nothing(rig):
-    with rig.page() as page:
-        follows(rig, page)
-        page.sends = False
-        rig.until(lambda: page.dead_man != 'ENGAGED')
-        page.sends = True
-        rig.passes(0.5)
-        assert page.dead_man == 'OPEN'
-        assert rig.stands()
-
-
 def test_an_operator_takes_over_and_has_to_grip_anew(rig):
     with rig.page() as first, rig.page() as second:
         follows(rig, first)
@@ -246,7 +217,9 @@ def test_a_viewer_looks_on(rig):
 def test_what_nobody_operates_any_more_is_paused_with_an_alarm(rig):
     with rig.page() as watching:
         with rig.page() as page:
-            ready(rig, page)
+            follows(rig, page)
+        stopped(rig, watching)
+        assert watching.state['dead_man']['reason'] in ('closed', *BUSY)
         unattended = 'enabled, and nobody operates: paused after 5 s'
         rig.until(lambda: unattended in [a['text'] for a in watching.state['alarms']], 'the alarm')
         rig.until(lambda: watching.state['operating_state'] == 'PAUSED', 'the pause')
@@ -399,6 +372,150 @@ def test_an_experiment_of_an_earlier_explanation_is_played_while_one_holds_on(ri
         assert not rig.setting('master.hold_to_play')
         assert rig.setting('master.command_file') == ''
         assert rig.wanted[-1] == pytest.approx(bending[-1], abs=0.005)
+
+
+@pytest.fixture
+def operator(rig):
+    """A page that operates an enabled slave, and sees that nothing of what happens touches it."""
+    with rig.page() as page:
+        ready(rig, page)
+        session = rig.client.session
+        yield page
+        assert rig.stands()
+        heard_ns = rig.client.state_ns
+        rig.until(lambda: rig.client.state_ns > heard_ns, 'the next word of the supervisor')
+        assert (rig.client.state, rig.client.session) == ('ENABLED', session)
+        assert page.closed is None
+        assert page.order('release')['ok']
+
+
+@pytest.fixture
+def place(rig):
+    host, _, port = rig.server.address.removeprefix('http://').rpartition(':')
+    return host, int(port)
+
+
+def greeted(rig, stack):
+    """A socket for commands that has said hello with the operator's token."""
+    url = rig.server.address.replace('http', 'ws', 1)
+    opened = stack.enter_context(
+        connect(f'{url}/command', origin=rig.server.address, compression=None, max_size=None)
+    )
+    opened.send(json.dumps({'op': 'hello', 'token': rig.server.token}))
+    assert json.loads(opened.recv(timeout=_PATIENCE_S))['op'] == 'hello'
+    return opened
+
+
+def counted(rig, page, what, at_least=1):
+    """Wait until so many refusals have been told."""
+    name = f'refused: {what}'
+    rig.until(lambda: page.state['counters'].get(name, 0) >= at_least, f'{name} in the counters')
+
+
+def closed(opened) -> int:
+    """Close code of a socket that the server ends."""
+    with suppress(ConnectionClosed):
+        while True:
+            opened.recv(timeout=_PATIENCE_S)
+    return opened.close_code
+
+
+@pytest.mark.parametrize(
+    ('sent', 'codes', 'check'),
+    [
+        # Of a sender that goes on sending, TCP may drop what it was told in the end.
+        (b'\x02' * _TEN_MEGABYTES, {1009, 1006}, 'frame too large'),
+        (random.Random(1).randbytes(32), {1008}, 'malformed'),
+        ('{"op": "claim"', {1008}, 'malformed'),
+    ],
+    ids=['ten megabytes', 'noise', 'half JSON'],
+)
+def test_what_is_no_frame_and_no_order_ends_its_sender(rig, operator, sent, codes, check):
+    with ExitStack() as stack:
+        other = greeted(rig, stack)
+        with suppress(ConnectionClosed):
+            other.send(sent)
+        assert closed(other) in codes
+    counted(rig, operator, check)
+
+
+def test_a_flood_ends_its_sender(rig, operator):
+    with ExitStack() as stack:
+        other = greeted(rig, stack)
+        with suppress(ConnectionClosed):
+            for seq in range(3 * FRAMES_A_SECOND):
+                other.send(encode_input(InputFrame(**{**_FRAME.__dict__, 'seq': seq + 1})))
+        assert closed(other) == 1008
+    counted(rig, operator, 'flood')
+
+
+def test_a_connection_is_for_one_request(place):
+    host, port = place
+    with socket.create_connection(place, _PATIENCE_S) as asking:
+        asking.sendall(f'GET /nothing HTTP/1.1\r\nHost: {host}:{port}\r\n\r\nG'.encode())
+        answer = b''
+        with suppress(ConnectionResetError):
+            while data := asking.recv(4096):
+                answer += data
+    assert b'connection: close' in answer
+
+
+def test_frames_of_somebody_else_move_nothing(rig, operator):
+    with ExitStack() as stack:
+        other = greeted(rig, stack)
+        pressed = {**_FRAME.__dict__, 'pressed': True, 'grip': 1000, 'x': 1.0}
+        for seq in range(20):
+            other.send(encode_input(InputFrame(**{**pressed, 'seq': seq + 1})))
+        others = 'frames of others'
+        rig.until(lambda: operator.state['counters'].get(others, 0) >= 20, others)
+        assert operator.dead_man != 'ENGAGED'
+
+
+def test_strangers_open_nothing(rig, operator, place):
+    """All that they may try is asked of the layer itself; here it stands before the server."""
+    url = rig.server.address.replace('http', 'ws', 1)
+    with connect(f'{url}/command', origin=rig.server.address, compression=None) as other:
+        other.send(json.dumps({'op': 'hello', 'token': 'x' * 43}))
+        assert closed(other) == 1008
+    counted(rig, operator, 'token')
+    stranger = 'https://evil.example'
+    with pytest.raises(InvalidStatus) as refused, connect(f'{url}/command', origin=stranger):
+        pass
+    assert refused.value.response.status_code == 403
+    counted(rig, operator, 'origin')
+    with socket.create_connection(place, _PATIENCE_S) as asking:
+        asking.sendall(b'GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n')
+        assert asking.recv(4096).split()[1] == b'400'
+    counted(rig, operator, 'host')
+
+
+def test_a_thousand_connections_leave_the_operator_alone(rig, operator, place):
+    with ExitStack() as stack:
+        for _ in range(1000):
+            with suppress(ConnectionResetError):
+                stack.enter_context(socket.create_connection(place, _PATIENCE_S))
+        assert operator.order('set', scale=0.5)['ok']
+    # There is room again.
+    with rig.page() as later:
+        assert later.order('bags')['ok']
+    assert operator.order('set', scale=1.0)['ok']
+
+
+def test_sockets_that_say_nothing_are_let_in_eight_at_a_time_and_for_two_seconds(rig, operator):
+    url = rig.server.address.replace('http', 'ws', 1)
+    with ExitStack() as stack:
+        silent = []
+        begun = time.monotonic()
+        with suppress(InvalidStatus):
+            for _ in range(UNANSWERED + 1):
+                opened = connect(f'{url}/command', origin=rig.server.address, compression=None)
+                silent.append(stack.enter_context(opened))
+        # On a machine that takes 2 s for eight of them the first are gone before the last comes.
+        if time.monotonic() - begun < 1.0:
+            assert len(silent) == UNANSWERED
+            counted(rig, operator, 'too many sockets without hello')
+        assert {closed(opened) for opened in silent} == {1008}
+    counted(rig, operator, 'hello', UNANSWERED - 1)
 
 
 def test_a_killed_server_moves_nothing_on(rig):
