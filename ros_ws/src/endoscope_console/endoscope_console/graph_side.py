@@ -26,7 +26,7 @@ from endoscope_nodes.client.graph_listener import MASTER, GraphError, Health
 from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
 from endoscope_nodes.client.handle_sender import handle_senders
 from endoscope_nodes.client.plant_adoption import AdoptedPlants
-from endoscope_nodes.names import CONSOLE_LOG, FINISHED
+from endoscope_nodes.names import CONSOLE_LOG, FINISHED, MASTER_NODE
 from endoscope_nodes.runtime.diagnostics import OK, WARN, status
 from endoscope_nodes.runtime.environment import joined_node
 from endoscope_nodes.runtime.qos import EVENT
@@ -111,7 +111,7 @@ class GraphSide:
     def ask_for_settings(self, now_ns: int) -> None:
         """Ask the master what it is set to, at a time in ns; the answer comes later."""
         self._asked_ns = now_ns
-        asking = self.client.client(GetParameters, 'console/get_parameters')
+        asking = self.client.client(GetParameters, f'{MASTER_NODE}/get_parameters')
         if asking.service_is_ready():
             if self._asking is not None and not self._asking.done():
                 asking.remove_pending_request(self._asking)
