@@ -139,7 +139,7 @@ def test_it_reads_where_the_links_are_though_nobody_here_has_the_package_of_the_
 def test_the_slave_follows_its_handle_while_the_clutch_is_held(graph, foreigner):
     assert while_(graph, 0.5, graph.goals) == []
     foreigner.tell('hold')
-    graph.until(lambda: graph.reported('console: commands')['following'] == 'True')
+    graph.until(lambda: graph.reported('master: commands')['following'] == 'True')
     before = graph.wanted[-1].position
     # Further than is waited for: a handle that is silent for once is followed anew from there.
     foreigner.tell('move 0.8')
@@ -154,7 +154,7 @@ def test_the_slave_follows_its_handle_while_the_clutch_is_held(graph, foreigner)
 def test_the_slave_holds_from_the_release_on_however_the_handle_moves(graph, foreigner):
     foreigner.tell('release')
     foreigner.tell('move -0.2')
-    graph.until(lambda: graph.reported('console: commands')['clutch held'] == 'False')
+    graph.until(lambda: graph.reported('master: commands')['clutch held'] == 'False')
     held = graph.goals[-1].position
     moving = while_(graph, 2.5, graph.goals)
     assert all(goal.position == held for goal in moving)

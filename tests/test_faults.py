@@ -25,13 +25,13 @@ def rig(tmp_path_factory):
     ('name', 'state'),
     [
         ('supervisor killed', 'DISABLED'),
-        ('console killed', 'FAULT'),
+        ('master killed', 'FAULT'),
         ('motor_driver stalled for 0.2 s', 'FAULT'),
         *(
             pytest.param(*row, marks=pytest.mark.nightly)
             for row in (
                 ('compensator killed', 'FAULT'),
-                ('console stalled for 2 s', 'FAULT'),
+                ('master stalled for 2 s', 'FAULT'),
                 ('rival on slave/servo_jp', 'FAULT'),
                 ('clutch released and pressed within 0.6 s', None),
                 ('commands 0.12 to 0.5 s late, outside program', 'FAULT'),

@@ -51,8 +51,8 @@ def hand(graph):
 
 
 def said(graph):
-    report = graph.diagnostics['console: commands'][-1]
-    values = graph.reported('console: commands')
+    report = graph.diagnostics['master: commands'][-1]
+    values = graph.reported('master: commands')
     return report.message, float(values['progress [s]'])
 
 

@@ -56,7 +56,7 @@ def test_a_calibration_finds_the_reach_and_the_master_keeps_to_it(tmp_path):
         asked = np.max([c.position for c in commands], axis=0)
         # The master brakes as the acceleration allows; the compensator cuts the way of braking.
         np.testing.assert_allclose(asked, [high for _, high in found], atol=0.03)
-        assert 'this tube can be bent: bend_x from ' in warnings(graph, 'console: commands')[-1]
+        assert 'this tube can be bent: bend_x from ' in warnings(graph, 'master: commands')[-1]
 
 
 def test_the_compensator_cuts_what_a_master_asks_for_beyond_it():

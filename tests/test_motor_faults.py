@@ -20,7 +20,7 @@ FAULTS = (
             'restart',
             'node hangs',
             'over-tension',
-            'console killed',
+            'master killed',
             'motor driver killed',
         )
     ),

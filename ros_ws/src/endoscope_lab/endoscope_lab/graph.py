@@ -353,7 +353,7 @@ def _counts(operator: Operator) -> Counter[str]:
     operator.serve(1.1)
     device = operator.graph.health['motor_driver: device'].values
     found = Counter({key: int(device[key]) for key in ('ticks', 'missed ticks')})
-    found['sent'] = int(operator.graph.health['console: commands'].values['published'])
+    found['sent'] = int(operator.graph.health['master: commands'].values['published'])
     for node in _OBEYING:
         for key, value in operator.graph.health[f'{node}: commands'].values.items():
             if key.startswith(('accepted', 'refused')):

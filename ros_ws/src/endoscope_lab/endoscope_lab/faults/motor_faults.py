@@ -130,8 +130,8 @@ MOTOR_FAULTS: dict[str, MotorFault] = {
     'over-tension': MotorFault('a wire at 80 N', _overpull, cause='over the ceiling'),
     'load cells silent': MotorFault('load cells fall silent', _stop_weighing, cause='silent'),
     'clutch released': MotorFault('operator lets go of the clutch', _let_go, 'ENABLED'),
-    'console killed': MotorFault(
-        'console killed (SIGKILL)',
+    'master killed': MotorFault(
+        'master killed (SIGKILL)',
         lambda rig: rig.kill('master'),
         cause='slave/servo_jp ended while the clutch was held',
         apart=('master',),

@@ -300,17 +300,17 @@ PROCESS_FAULTS: Mapping[str, ProcessFault] = (
     _ANYWHERE
     | {name: fault for node in NODES for name, fault in _of_process(node).items()}
     | {
-        'console stalled for 0.5 s, clutch released and pressed': ProcessFault(_stall_with_clutch),
+        'master stalled for 0.5 s, clutch released and pressed': ProcessFault(_stall_with_clutch),
         'motor_driver stalled for 0.3 s, clutch pressed': ProcessFault(
             _press_while_the_driver_stalls
         ),
         'supervisor killed, master plays': ProcessFault(
             lambda rig: rig.kill('supervisor'), 'motion', 'supervisor'
         ),
-        'console killed, master plays': ProcessFault(
+        'master killed, master plays': ProcessFault(
             lambda rig: rig.kill('master'), 'motion', 'master'
         ),
-        'console stalled for 2 s, master plays': ProcessFault(
+        'master stalled for 2 s, master plays': ProcessFault(
             partial(_stall, 'master', 2.0), 'motion'
         ),
     }
