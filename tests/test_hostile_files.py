@@ -394,6 +394,11 @@ def test_records_that_cannot_be_are_refused_and_what_is_whole_is_saved(path, who
         MAGIC + built([(o, b'\0' if o == DATA_END else b) for o, b in records]) + MAGIC
     )
     one_line(path, 'dataend|data_end', N)
+    wrong = struct.pack('<I', 12345)
+    path.write_bytes(
+        MAGIC + built([(o, wrong if o == DATA_END else b) for o, b in records]) + MAGIC
+    )
+    one_line(path, 'the data do not agree with their checksum', N)
     path.write_bytes(bag_of([record for record in records if record[0] != CHANNEL]))
     one_line(path, f'{N} messages of no channel')
     k = next(k for k, record in enumerate(records) if record[0] == CHANNEL)

@@ -2,7 +2,7 @@
 
 import random
 
-from endoscope_devices.dynamixel.servo_block import Freshness, TickClock
+from endoscope_devices.dynamixel.servo_block import BlockJudge, Freshness, ServoBlock, TickClock
 
 MS = 1_000_000
 
@@ -69,3 +69,12 @@ def test_a_clock_that_stands_still_is_noticed():
 def test_after_a_long_silence_the_next_tick_is_taken_as_it_is():
     _, clock, now = running()
     assert clock.judge(12, now + 10**10, now + 10**10 + MS) is Freshness.NEW
+
+
+def test_a_shaft_that_cannot_have_come_there_is_not_believed():
+    judge, servo, now = BlockJudge(8.0, 1.0), Servo(), 5 * 10**11
+    for k, angle in enumerate((0.0, 0.0, 0.02, 0.1)):
+        asked = now + 2 * k * MS
+        block = ServoBlock(servo.tick(asked + 400_000), 5, 0.0, 0.0, angle)
+        verdict = judge.judge(block, 5, asked, asked + 800_000)
+        assert (verdict is Freshness.NEW) == (angle < 0.1), verdict

@@ -420,7 +420,7 @@ def test_angles_are_in_degrees(page):
     assert re.search(r'slave:bend_x deg [\d.]+ \(', text_of(page))
     assert ' rad ' not in text_of(page[page.index('The ladder of fits') :].split('<footer>')[0])
     assert in_degrees('angle_rad', 'rad')[:2] == ('angle_deg', 'deg')
-    assert in_degrees('rate_rad_per_s', 'rad/s')[:2] == ('rate_deg_per_s', 'deg/s')
+    assert in_degrees('rate_rad_per_s', 'rad/s') == ('rate_deg_per_s', 'deg/s', np.degrees(1.0))
     assert in_degrees('motor_bandwidth', 'rad/s') == ('motor_bandwidth', 'rad/s', 1.0)
 
 
