@@ -37,6 +37,7 @@ EVIDENCE = {
     'count': 'samples that show it',
     'gaps': 'number of gaps',
     'missing_s': 'seconds without samples',
+    'jitter_s': 'rms jitter of the stamps in seconds',
     'longest_s': 'longest stretch in seconds',
     'worst_s': 'largest step back in seconds',
     'z': 'standard deviations from zero',
