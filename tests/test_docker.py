@@ -223,6 +223,22 @@ def test_compose_accepts_the_hardware() -> None:
     assert '_PORT' in without_ports.stderr or 'RIG' in without_ports.stderr
 
 
+def test_the_image_of_a_robot_gets_colcon_alone_beside_what_its_programs_need() -> None:
+    dockerfile = (ROOT / 'docker' / 'Dockerfile').read_text()
+    [words] = re.findall(r'make -C ros_ws (LAB= .*?) \\', dockerfile)
+    # Whatever is installed here already counts as missing.
+    planned = subprocess.run(
+        ['make', '--always-make', '--dry-run', '-C', ROOT / 'ros_ws', *words.split()],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    locks = set(re.findall(r'--requirement requirements-(\w+)\.lock', planned))
+    assert locks - {'ros'} == {'uv', 'colcon'}
+    assert not re.search('--editable src/endoscope_(emulators|lab)', planned)
+    assert '--packages-ignore endoscope_emulators endoscope_lab' in planned
+
+
 def test_files_that_the_image_names_exist() -> None:
     dockerfile = (ROOT / 'docker' / 'Dockerfile').read_text()
     entry_point = re.search(r'ENTRYPOINT \["/endoscope/([^"]+)"\]', dockerfile)
