@@ -417,6 +417,12 @@ def test_scale_and_mode_change_only_while_nothing_is_held(console, page):
 
 
 def test_recordings_are_made_and_offered_for_explanation(console, page):
+    page.click('#tab-explain')
+    expect(page.locator('#ask-go')).to_be_disabled()
+    expect(page.locator('#ask-why')).to_contain_text('There is no recording yet')
+    expect(page.locator('#investigate')).to_be_disabled()
+    expect(page.locator('#investigate-why')).to_contain_text('take the controls')
+    page.click('#tab-operate')
     take(page)
     page.click('#record')
     shows(page, 'record', 'Stop recording')

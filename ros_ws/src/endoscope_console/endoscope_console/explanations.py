@@ -167,8 +167,8 @@ class Explanations:
         return {'explanation': one.id}
 
     def plant_file(self, plant: str | None, own: str = '') -> Path:
-        """File of a plant that `listing` names, or of the graph's own where none is named."""
-        if plant is None:
+        """File of a plant that `listing` names; of the graph's own where that or none is named."""
+        if plant is None or plant == own:
             return self._own_plant(own)
         plants = self._plants()
         if plant not in plants:

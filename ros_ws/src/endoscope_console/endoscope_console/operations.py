@@ -200,7 +200,7 @@ class Operations:
                 own = await self._ask(self.graph.plant)
                 return await self._ask(self.explanations.listing) | {'own_plant': own}
             case orders.Explain():
-                own = '' if order.plant else await self._ask(self.graph.plant)
+                own = await self._ask(self.graph.plant)
                 return await self.explanations.begin(
                     order.bag, order.plant, order.baseline, order.validate, own
                 )
@@ -388,7 +388,7 @@ class Operations:
         if order.investigation is not None:
             one = self.investigations.resume(order.investigation, rig, order.experiments, play)
         else:
-            own = '' if order.plant else await self._ask(self.graph.plant)
+            own = await self._ask(self.graph.plant)
             one = self.investigations.begin(order.plant, own, rig, order.experiments, play)
         return {'investigation': one}
 

@@ -60,6 +60,18 @@ def test_a_process_has_the_plant_and_seed_of_its_rig_file_unless_told_otherwise(
             assert runtime.seed_of(1) == seed
 
 
+def test_a_file_is_named_by_its_whole_path_for_programs_in_other_folders(tmp_path, monkeypatch):
+    plant = saved(tmp_path, 'hidden.yaml', 0.6)
+    (tmp_path / 'rig.yaml').write_text('simulation: {seed: 7}')
+    monkeypatch.chdir(tmp_path)
+    words = ['-p', 'plant_file:=hidden.yaml', '-p', 'rig_file:=rig.yaml']
+    args = ['--ros-args', '-p', 'use_sim_time:=true', '--log-level', 'fatal', *words]
+    with Runtime(args, Context(), 77) as runtime:
+        node = runtime.add(MotorDriverNode)
+        assert node.get_parameter('plant_file').value == str(plant)
+        assert node.get_parameter('rig_file').value == str(tmp_path / 'rig.yaml')
+
+
 def test_a_device_that_the_rig_file_names_is_looked_for(tmp_path):
     rig = tmp_path / 'rig.yaml'
     rig.write_text('devices: {motors: dynamixel}')

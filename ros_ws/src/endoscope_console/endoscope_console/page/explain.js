@@ -34,8 +34,10 @@ export class Explain {
     write($('in-force').querySelector('p'), adopted ? adopted.words : 'no compensator says which');
     toggle($('undo'), 'disabled', !mine || !adopted?.undo);
     const mayAsk = role === 'operator';
-    toggle($('ask-go'), 'disabled', !mayAsk);
     const { recording = false, bag = '' } = state?.recorder ?? {};
+    const none = recording ? '' : 'There is no recording yet. Press Record on the page Operate, and move.';
+    toggle($('ask-go'), 'disabled', !mayAsk || !$('bag').options.length);
+    write($('ask-why'), mayAsk ? ($('bag').options.length ? '' : none) : 'This page looks on: an operator explains.');
     toggle($('being-recorded'), 'hidden', !recording);
     write($('being-recorded').querySelector('p'), `${nameOfBag(bag)} is being recorded.`);
     toggle($('stop-and-explain'), 'disabled', !mayAsk || !this._app.mayRecord());
@@ -78,8 +80,8 @@ export class Explain {
     fill('validate', options([{ value: '', text: 'the end of the recording itself' }]));
     fill('plants', (answer.plants ?? []).map((plant) => ({ value: plant, text: plant })));
     set($('plant'), 'placeholder', answer.own_plant ? `this graph's own: ${answer.own_plant}` : 'a plant.yaml');
-    const recording = this._app.state?.recorder?.recording;
-    write($('ask-answer'), bags.length || recording ? '' : 'There is no recording yet. Press Record on the page Operate, and move.');
+    write($('ask-answer'), '');
+    this.render();
   }
 
   /** End the recording that is under way, and have it explained. */

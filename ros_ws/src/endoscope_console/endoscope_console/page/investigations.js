@@ -18,10 +18,12 @@ export class Investigations {
   }
 
   render() {
-    const { state, mine } = this._app;
+    const { state, mine, role } = this._app;
     const all = state?.investigations ?? [];
     const busy = all.some((one) => one.running);
     toggle($('investigate'), 'disabled', !mine || busy);
+    const held = role === 'operator' ? 'It moves the rig: take the controls on the page Operate first.' : 'This page looks on: an operator investigates.';
+    write($('investigate-why'), busy ? 'One investigation at a time: this one first.' : mine ? '' : held);
     each($('investigations'), all, (one) => one.id, (one) => this._card(one), (card, one) => this._fill(card, one, busy));
     for (const one of all) {
       if (one.running) this._followed.add(one.id);

@@ -47,7 +47,13 @@ def declare_parameters[P](
             dynamic_typing=True,
             additional_constraints=constraints(field),
         )
-        given = node.declare_parameter(name, default, descriptor).value
+        override = node._parameter_overrides.get(name)  # noqa: SLF001
+        if field.metadata['file'] and override is not None:
+            path = override.value
+            default = str(Path(path).absolute()) if path and isinstance(path, str) else path
+        given = node.declare_parameter(
+            name, default, descriptor, ignore_override=field.metadata['file']
+        ).value
         values[name] = checked(node.get_name(), field, hints[name], given)
     current = kind(**values)
     if any(f.metadata['dynamic'] for f in fields.values()):

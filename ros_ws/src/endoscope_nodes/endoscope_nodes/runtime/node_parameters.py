@@ -48,10 +48,14 @@ class BeatParameters:
         high=1000,
     )
     rig_file: str = parameter(
-        '', 'rig.yaml with gear, limits, time-outs and devices; what it does not say is as shipped'
+        '',
+        'rig.yaml with gear, limits, time-outs and devices; what it does not say is as shipped',
+        file=True,
     )
     plant_file: str = parameter(
-        '', 'plant.yaml of the simulated slave and its sensors; empty for that of the rig file'
+        '',
+        'plant.yaml of the simulated slave and its sensors; empty for that of the rig file',
+        file=True,
     )
     seed: int = parameter(
         -1, 'seed of the simulated sensor noise; -1 for that of the rig file', low=-1

@@ -26,11 +26,13 @@ def parameter(
     high: float | None = None,
     choices: tuple[str, ...] = (),
     dynamic: bool = False,
+    file: bool = False,
 ) -> Any:
     """Describe one parameter as a dataclass field.
 
     `default` is a bool, int, float, str, or a tuple of float or str; `low` and `high` are
-    inclusive, for each number of a tuple; empty `choices` allow any string.
+    inclusive, for each number of a tuple; empty `choices` allow any string. A `file` has its whole
+    path, so that a program in another folder finds it by the parameter.
     """
     return dataclasses.field(
         default=default,
@@ -41,6 +43,7 @@ def parameter(
             'high': high,
             'choices': choices,
             'dynamic': dynamic,
+            'file': file,
         },
     )
 
