@@ -21,6 +21,15 @@ def explained_once(corpus):
     """Refuse the engine what the corpus has not."""
 
 
+@pytest.fixture(autouse=True, scope='module')
+def own_domains():
+    """Let a run of many files hold no more ROS domains than one of them needs."""
+    from endoscope_nodes.runtime.private_domain import domains_given_back
+
+    with domains_given_back():
+        yield
+
+
 @pytest.fixture(scope='module')
 def browser():
     # Only tests in a browser need what it is driven by.

@@ -4,6 +4,8 @@ import fcntl
 import itertools
 import os
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import TextIO
@@ -30,6 +32,19 @@ def process_domain() -> int:
     """The one for graphs of this process that run one after the other."""
     # With one each, a long bench would come to hold them all.
     return private_domain()
+
+
+@contextmanager
+def domains_given_back() -> Iterator[None]:
+    """Give back at its end what was given within: tests of one file, say, of the many of a run."""
+    before = set(_held)
+    process_domain.cache_clear()
+    try:
+        yield
+    finally:
+        process_domain.cache_clear()
+        for domain in set(_held) - before:
+            _held.pop(domain).close()
 
 
 def _lock(domain: int) -> bool:
