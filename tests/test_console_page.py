@@ -374,7 +374,9 @@ def test_home_calibration_and_compensation(console, page):
     expect(page.locator('#answer')).to_contain_text('physical now, and was bouc_wen')
     expect(page.locator('#compensator')).to_have_value('physical')
     expect(page.locator('#compensator-in-force')).to_be_empty()
-    shows(page, 'next', re.compile('^Hold Space and press an arrow key'))
+    shows(page, 'next', re.compile('^Hold Space and press an arrow key.* Or hold Home'))
+    hold(page, 'home')
+    shows(page, 'next', re.compile('^Hold Space and press an arrow key, or drag on the pad.$'))
 
     def compensation():
         node = console.graph.nodes['compensator']

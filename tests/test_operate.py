@@ -76,12 +76,11 @@ def test_calibrate_shows_progress_and_ends_with_class_size_and_reach(graph):
     assert status == 0, errors
     lines = out.splitlines()
     assert re.fullmatch(r'class \d+ deg with probability 0\.\d+|class .* 1\.000', lines[0])
-    assert re.fullmatch(r'backlash \d+\.\d deg by the cnn', lines[1])
     size = re.fullmatch(
-        r'size (\S+) deg by the tensions, with 90 % between (\S+) and (\S+) deg', lines[2]
+        r'backlash (\S+) deg by the tensions, 90 % between (\S+) and (\S+) deg', lines[1]
     )
     assert float(size[2]) < float(size[1]) < float(size[3])
-    assert [line.partition(' from ')[0] for line in lines[3:]] == [
+    assert [line.partition(' from ')[0] for line in lines[2:]] == [
         'bend_x can be bent',
         'bend_y can be bent',
     ]

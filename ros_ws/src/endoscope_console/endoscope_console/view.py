@@ -15,6 +15,7 @@ from endoscope_console.operations import Operations
 from endoscope_console.teleop.lease import UNATTENDED_NS
 from endoscope_console.teleop.operator import STATE_NS, DeadManState, Reason
 from endoscope_core.rig import Rig
+from endoscope_nodes.client.calibration_result import NONE_OF_THEM
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import (
     COMMANDS,
@@ -127,7 +128,7 @@ class View:
                 'running': order is not None,
                 'step': '' if order is None else order.words,
                 'progress': 0.0 if order is None else order.progress,
-                'result': _result(client.calibration),
+                'result': result(client.calibration),
             },
             'compensator': _compensator(client.compensator),
             'adopted': _adopted(self._graph.plants.in_force),
@@ -265,7 +266,7 @@ def _number(said: Health, key: str) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _result(said: Health | None) -> dict[str, Any] | None:
+def result(said: Health | None) -> dict[str, Any] | None:
     """The last calibration, for a person: in degrees."""
     if said is None:
         return None
@@ -275,6 +276,7 @@ def _result(said: Health | None) -> dict[str, Any] | None:
     )
     return {
         'class_deg': _number(said, 'class_deg'),
+        'none': said.values.get('class_deg') == NONE_OF_THEM,
         'probability': _number(said, 'probability'),
         'size_deg': _number(said, 'backlash_size_deg') if size is None else size,
         'low_deg': low,

@@ -4,7 +4,7 @@ import pytest
 
 from endoscope_console.alarms import Alarm, Alarms, Level
 from endoscope_console.graph_side import is_calibrated
-from endoscope_console.view import busy
+from endoscope_console.view import busy, result
 from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.client.graph_listener import Health
 
@@ -57,3 +57,10 @@ def test_a_calibration_that_was_aborted_is_none():
     assert not is_calibrated(None)
     assert not is_calibrated(Health(2, 'aborted: a tension', {'step': 'recording'}, 1, 1))
     assert is_calibrated(Health(0, 'class 70 deg', {'class_deg': '70'}, 1, 1))
+
+
+def test_what_fits_no_class_is_told_from_what_was_aborted_with_its_whole_reason():
+    reason = 'none of the classes: the tensions are too far from those of all known tubes'
+    refused = result(Health(2, reason, {'class_deg': 'none', 'reason': reason}, 1, 1))
+    assert (refused['none'], refused['class_deg'], refused['message']) == (True, None, reason)
+    assert not result(Health(2, 'aborted: a tension', {'step': 'recording'}, 1, 1))['none']

@@ -189,17 +189,15 @@ def calibration_in_words(result: Health | None) -> tuple[str, ...]:
     if result.level:
         return (result.message,)
     lines = [result.message]
-    lines.append(
-        f'backlash {float(values["backlash_size_deg"]):.1f} deg by the '
-        f'{values["backlash_size_from"]}'
-    )
     if 'regressed_size' in values:
         size, low, high = (
             math.degrees(float(values[f'regressed_size{end}'])) for end in ('', '_low', '_high')
         )
         lines.append(
-            f'size {size:.1f} deg by the tensions, with 90 % between {low:.1f} and {high:.1f} deg'
+            f'backlash {size:.1f} deg by the tensions, 90 % between {low:.1f} and {high:.1f} deg'
         )
+    if values['backlash_size_from'] == 'tracker':
+        lines.append(f'backlash {float(values["backlash_size_deg"]):.1f} deg by the tracker')
     for joint in JOINTS:
         ends = [values.get(f'reach.{joint}.{end}') for end in ('low', 'high')]
         if None not in ends:

@@ -35,6 +35,9 @@ export function lamp(state) {
   return 'OPEN';
 }
 
+/** Whether the last calibration ended without a class because none of them fits the tube. */
+export const isOfNoClass = (state) => Boolean(state?.calibration?.result?.none);
+
 /** Whether a calibration has found the class of the tube. */
 export const isCalibrated = (state) => Number.isFinite(state?.calibration?.result?.class_deg);
 
@@ -46,7 +49,7 @@ export const stateIsFresh = (state, stateAge) =>
  * The step that comes next, 0 to 5, and what to say:
  * 0 cannot, 1 take the controls, 2 enable, 3 calibrate (or move uncompensated), 4 let go first, 5 hold and move.
  */
-export function nextStep({ connected, current, role, mine, state, stateAge, rests, busy, half, held, touch, why }) {
+export function nextStep({ connected, current, role, mine, state, stateAge, rests, busy, half, held, touch, home, why }) {
   if (!connected) return { step: 0, text: `Connecting to the console …${why ? ` It said: ${why}.` : ''}` };
   if (!state) return { step: 0, text: 'Waiting for the graph …' };
   if (!current) return { step: 0, text: 'Nothing is heard of the console. Let go: what is shown is not current.' };
@@ -79,11 +82,15 @@ export function nextStep({ connected, current, role, mine, state, stateAge, rest
   if (half) return { step: 5, text: 'One finger is down. Hold the left area and the pad together.' };
   if (deadMan?.state === 'READY') {
     if (playing) return { step: 5, text: `${hold}, and ${played(state)} plays. Let go, and it stops.` };
+    const move = touch ? 'hold the left area and drag' : 'hold Space and an arrow key';
+    if (isOfNoClass(state)) {
+      return { step: 5, text: `None of the classes fits this tube: record a motion, and Explain or Investigate (tab Explain) says what differs. Or ${move}, uncompensated.` };
+    }
     if (!isCalibrated(state)) {
-      const move = touch ? 'hold the left area and drag' : 'hold Space and an arrow key';
       return { step: 3, text: `Hold Calibrate for 1 s${touch ? '' : ', or key C'}: it moves by itself for some seconds. Or ${move}, uncompensated.` };
     }
-    return { step: 5, text: touch ? 'Hold the left area, and drag on the pad.' : 'Hold Space and press an arrow key, or drag on the pad.' };
+    const homing = home ? ` Or hold Home for 1 s${touch ? '' : ', or key H'}: the motors turn to zero.` : '';
+    return { step: 5, text: `${touch ? 'Hold the left area, and drag on the pad.' : 'Hold Space and press an arrow key, or drag on the pad.'}${homing}` };
   }
   const missing = deadMan?.missing || deadMan?.reason || '';
   if (held || busy || missing === 'hands on') return { step: 4, text: 'Let go of everything first, then take hold anew.' };

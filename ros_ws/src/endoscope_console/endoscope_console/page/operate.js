@@ -3,7 +3,7 @@
 import { SIGN, standing } from './alarms.js';
 import { keysAreTaken } from './dead_man.js';
 import { $, each, make, set, toggle, write } from './elements.js';
-import { inWords, isCalibrated, lamp, nameOf, nextStep, played, stateIsFresh } from './guidance.js';
+import { inWords, isCalibrated, isOfNoClass, lamp, nameOf, nextStep, played, stateIsFresh } from './guidance.js';
 import { HoldButton } from './hold_button.js';
 
 const SCALES = [0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3];
@@ -30,6 +30,8 @@ export class Operate {
     this.app = app;
     this._faultSince = null;
     this._answered = 0;
+    // Since a calibration, until the instrument has moved otherwise.
+    this._offersHome = false;
     this._sliding = 0;
     this._scaleAsked = NaN;
     this._scaleAskedAt = -Infinity;
@@ -37,8 +39,8 @@ export class Operate {
     const free = () => !app.hands.held;
     this._holds = {
       KeyE: new HoldButton($('enable'), () => this._enable()),
-      KeyH: new HoldButton($('home'), () => this._order({ op: 'state', command: 'home' }, 'Home'), free),
-      KeyC: new HoldButton($('calibrate'), () => this._order({ op: 'calibrate' }, 'Calibrate'), free),
+      KeyH: new HoldButton($('home'), () => this._home(), free),
+      KeyC: new HoldButton($('calibrate'), () => this._calibrate(), free),
     };
     this._buttons();
     this._keys();
@@ -92,9 +94,10 @@ export class Operate {
     this._renderSigns();
     this._renderAlarms();
     const rests = this._restsAfterFault(fresh);
+    if (state?.operating_state !== 'ENABLED' || state.dead_man?.state === 'ENGAGED') this._offersHome = false;
     const next = nextStep({
       connected, current: app.current(), role, mine, state, stateAge: age, rests, busy: app.hands.busy, half: app.hands.half, held: app.hands.held,
-      touch: app.touch, why: app.whyClosed,
+      touch: app.touch, home: this._offersHome, why: app.whyClosed,
     });
     write($('next'), next.text);
     set(document.body, 'data-step', String(next.step));
@@ -193,6 +196,7 @@ export class Operate {
     this._holds.KeyE.enabled = may && now !== null && now !== 'ENABLED' && !rests && !state.prepares;
     write($('enable').querySelector('span'), now === 'PAUSED' ? 'Resume' : 'Enable');
     this._holds.KeyH.enabled = may && now === 'ENABLED' && !busy;
+    set($('home'), 'data-offered', String(this._offersHome));
     this._holds.KeyC.enabled = may && now === 'ENABLED' && !busy;
     toggle($('disable'), 'disabled', !app.mayHalt() || now === 'DISABLED');
   }
@@ -231,6 +235,8 @@ export class Operate {
     if (running) text = `${step || 'calibrating'}, ${Math.round(100 * (progress ?? 0))} %`;
     else if (result) text = result.message || 'calibrated';
     write($('calibration-text'), text);
+    // A reason takes the place of what was not found.
+    toggle($('found'), 'hidden', isOfNoClass(state));
     write($('class'), known ? `${deg(result.class_deg)} (${Math.round(100 * (result.probability ?? 0))} %)` : '–');
     write($('size'), known ? deg(result.size_deg, 1) : '–');
     write($('interval'), result && Number.isFinite(result.low_deg) ? `${deg(result.low_deg, 1)} and ${deg(result.high_deg, 1)}` : '–');
@@ -253,6 +259,16 @@ export class Operate {
     const answer = await this.app.orders.give(order);
     this.say(answer.ok ? `${name}: done${answer.why ? `, ${answer.why}` : ''}` : `${name} refused: ${answer.why}`);
     return answer;
+  }
+
+  async _calibrate() {
+    const answer = await this._order({ op: 'calibrate' }, 'Calibrate');
+    this._offersHome = answer.ok || isOfNoClass(this.app.state);
+  }
+
+  async _home() {
+    this._offersHome = false;
+    await this._order({ op: 'state', command: 'home' }, 'Home');
   }
 
   async _enable() {

@@ -63,6 +63,8 @@ test('a stranger is led to the first motion step by step', () => {
     [{}, state({ dead_man: { state: 'READY', reason: 'released' }, ...CALIBRATED }), 5, 'Hold Space and press an arrow'],
     [{}, state({ dead_man: { state: 'READY', reason: 'released' } }), 3, 'Hold Calibrate'],
     [{}, state({ dead_man: { state: 'READY' }, calibration: { result: { class_deg: null } } }), 3, 'Hold Calibrate'],
+    [{}, state({ dead_man: { state: 'READY' }, calibration: { result: { class_deg: null, none: true } } }), 5, 'Explain or Investigate'],
+    [{ home: true }, state({ dead_man: { state: 'READY' }, ...CALIBRATED }), 5, 'Or hold Home'],
     [{ touch: true }, state({ dead_man: { state: 'READY', reason: '' }, ...CALIBRATED }), 5, 'left area'],
     [{ half: true }, state({ dead_man: { state: 'READY', reason: '' } }), 5, 'together'],
     [{}, state({ dead_man: { state: 'ENGAGED' } }), 5, 'Following'],
