@@ -13,6 +13,7 @@ from tubes import slave_of, tube_of_size
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.physics import EffectSpec, PlantDescription
 from endoscope_core.rig import load_rig
+from endoscope_lab.dataset.rig_variation import backlash_sizes
 from endoscope_nodes.names import CALIBRATION_FEEDBACK, CALIBRATION_NUMBERS
 from endoscope_nodes.runtime.qos import RESULT, profile
 from endoscope_nodes.topics import Qos
@@ -81,6 +82,24 @@ def test_tensions_of_no_known_tube_are_refused_and_nothing_is_compensated(tmp_pa
         assert values['reason'].startswith('none of the classes: the tensions')
         assert graph.nodes['compensator'].findings is None
         assert graph.states[-1] == 'ENABLED'
+
+
+def test_wires_that_lost_pretension_are_told_with_the_class_by_the_plant(tmp_path):
+    plant = PlantDescription()
+    joints = {k: dataclasses.replace(j, pretension=3.54) for k, j in plant.joints.items()}
+    plant = dataclasses.replace(plant, joints=joints)
+    overrides = slave_of(plant, tmp_path / 'loose.yaml')
+    overrides['calibration'] = {'motion': 'brief'}
+    with SimulatedGraph(overrides=overrides) as graph:
+        graph.enable()
+        values = graph.calibrate()
+        true = math.degrees(np.mean(backlash_sizes(plant)))
+        assert values['backlash_size_from'] == 'plant'
+        assert float(values['backlash_size_deg']) == pytest.approx(true, abs=2.0)
+        assert abs(float(values['class_deg']) - true) < 6.0
+        assert float(values['pretension_lost.bend_y']) == pytest.approx(0.9, abs=0.1)
+        told = graph.results[-1].status[0].message
+        assert 'lost pretension (bend_x 0.9 N, bend_y 0.9 N): tighten them' in told
 
 
 def test_a_zero_that_is_off_is_told_with_the_class_or_the_refusal(tmp_path):

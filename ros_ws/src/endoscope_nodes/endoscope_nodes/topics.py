@@ -202,14 +202,17 @@ TOPICS = (
         'once a calibration, latched',
         'status `calibration: hysteresis class`: `class_deg`, `probability`, `probability_40_deg` '
         'to `probability_100_deg`, `backlash_size` in rad, `backlash_size_deg`, '
-        '`backlash_size_from` `tracker` or `cnn`, `regressed_size` by the CNN from tensions alone '
+        '`backlash_size_from` `tracker`, `cnn`, or `plant` where the classifier knows no such '
+        'tensions and the plant explains them (with what wires have lost in N as '
+        '`pretension_lost.bend_x` and so on), `regressed_size` by the CNN from tensions alone '
         'in rad and its 90 % interval '
         '`regressed_size_low` to `regressed_size_high`, `duration` in s, what the zero of each '
         'load cell is off by as `zero_error.wire_x_pos` and so on in N, and unless '
         '`identify_plant` is false the plant of each joint as `bend_x.capstan_exponent` and so on, '
         'and how far the tube lets it bend as `reach.bend_x.low` and `reach.bend_x.high` in rad. '
-        'After an abort the level is ERROR, with `reason` and `step`; for tensions unlike any '
-        'known tube it is ERROR, with `reason` and `class_deg` `none`, and nothing is compensated',
+        'After an abort the level is ERROR, with `reason` and `step`; for tensions '
+        'that neither explains it is ERROR, with `reason` and `class_deg` `none`, and '
+        'nothing is compensated',
         offered=RESULT,
         asked=RESULT,
         said_by=('calibration',),

@@ -196,8 +196,8 @@ def calibration_in_words(result: Health | None) -> tuple[str, ...]:
         lines.append(
             f'backlash {size:.1f} deg by the tensions, 90 % between {low:.1f} and {high:.1f} deg'
         )
-    if values['backlash_size_from'] == 'tracker':
-        lines.append(f'backlash {float(values["backlash_size_deg"]):.1f} deg by the tracker')
+    if (source := values['backlash_size_from']) != 'cnn':
+        lines.append(f'backlash {float(values["backlash_size_deg"]):.1f} deg by the {source}')
     for joint in JOINTS:
         ends = [values.get(f'reach.{joint}.{end}') for end in ('low', 'high')]
         if None not in ends:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import Protocol
 
 import numpy as np
@@ -14,6 +15,10 @@ WIRES = 4
 """Wires whose tensions a classifier reads, in the order x_pos, x_neg, y_pos, y_neg."""
 LEVEL = 0.9
 """Share of intervals that are to hold the true size."""
+HALF_CLASS = math.radians(5.0)
+PLANT_DEVIATION = math.radians(0.9)
+"""Rms error in rad of the size by the plant in 23 calibrations of simulated tubes whose wires had
+lost up to 1.8 N of pretension."""
 
 
 class ClassifierError(EndoscopeError, ValueError):
@@ -52,6 +57,8 @@ class Classifier(Protocol):
 
     motion: str
     """Name of the calibration motion whose tensions it reads."""
+    classes_deg: tuple[int, ...]
+    """Backlash sizes of the classes."""
 
     def classify(self, tension: ArrayLike) -> ClassificationResult:
         """Class of the tensions (N, 4) in N at 1 kHz from the start of the motion.
@@ -77,3 +84,19 @@ def checked_tension(
 def nearest_class(size: float, classes_deg: Sequence[int]) -> int:
     """Class in deg that is nearest to a backlash size in rad."""
     return min(classes_deg, key=lambda each: abs(math.radians(each) - size))
+
+
+def is_of_a_class(size: float, classes_deg: Sequence[int]) -> bool:
+    """Whether a backlash size in rad is within half a step of 10 deg of a class."""
+    nearest = math.radians(nearest_class(size, classes_deg))
+    return abs(nearest - size) <= HALF_CLASS
+
+
+def of_size(size: float, classes_deg: Sequence[int]) -> ClassificationResult:
+    """The class of a tube whose backlash size in rad its plant has told."""
+    borders = [math.radians(each) - HALF_CLASS for each in classes_deg[1:]]
+    told = NormalDist(size, PLANT_DEVIATION)
+    below = [0.0, *(told.cdf(border) for border in borders), 1.0]
+    each = dict(zip(classes_deg, np.diff(below).tolist(), strict=True))
+    nearest = nearest_class(size, classes_deg)
+    return ClassificationResult(nearest, each[nearest], each, size)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from endoscope_core.classifier.classification import (
+    HALF_CLASS,
     LEVEL,
     WIRES,
     ClassificationResult,
@@ -38,7 +39,6 @@ KNOWN = 0.995
 """Share of known tubes that are not to be refused."""
 OWN_OUTPUTS = 3
 """After the classes: size, logarithm of its deviation, and logit of 'none of these'."""
-HALF_CLASS = math.radians(5.0)
 _NORMAL = NormalDist()
 
 _OPEN = (

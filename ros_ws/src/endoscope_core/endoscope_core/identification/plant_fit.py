@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,9 +15,11 @@ from threadpoolctl import threadpool_limits
 
 from endoscope_core.control.internal_model import PhysicalParameters
 from endoscope_core.errors import EndoscopeError
+from endoscope_core.metrics import NoLoopError, width_at_mid_height
 from endoscope_core.physics import JointParameters, PlantDescription, simulate
 from endoscope_core.physics.effects import KNOWN
 from endoscope_core.physics.family import CENTRE, MOST_BENT, shipped_family
+from endoscope_core.signals import CALIBRATION_RATE, calibration_motion
 
 Array = NDArray[np.float64]
 
@@ -216,7 +218,14 @@ class _Search:
 def plants_of_calibration(
     command: ArrayLike, tension: ArrayLike, gear: float
 ) -> tuple[PhysicalParameters, ...]:
-    """Plants of all joints from a calibration, the joints side by side.
+    """Plants of all joints from a calibration, as `fits_of_calibration` finds them."""
+    return tuple(fit.parameters for fit in fits_of_calibration(command, tension, gear))
+
+
+def fits_of_calibration(
+    command: ArrayLike, tension: ArrayLike, gear: float
+) -> tuple[PlantFit, ...]:
+    """Fits of all joints to a calibration, the joints side by side.
 
     All have the same joint-equivalent motor command (N,) in rad at 1 kHz; `gear` is the shaft's
     angle for one radian at the joint. Tensions (N, 2 J) in N are of the positive and the negative
@@ -230,8 +239,34 @@ def plants_of_calibration(
     # The simulation lets go of the interpreter: two joints take two cores, unless the threads of
     # small matrices are in the way.
     with threadpool_limits(1, 'blas'), ThreadPoolExecutor(len(pairs)) as pool:
-        fits = list(pool.map(lambda pair: fit_plant(u, pair, gear=gear), pairs))
-    return tuple(fit.parameters for fit in fits)
+        return tuple(pool.map(lambda pair: fit_plant(u, pair, gear=gear), pairs))
+
+
+def size_of_explained(fits: Sequence[PlantFit], gear: float) -> float | None:
+    """Backlash size in rad under the calibration sinusoid, mean of the joints, by their plants.
+
+    None where a plant leaves more of the tensions than the fit takes for noise, or has no loop.
+    """
+    if any(fit.tension_rmse > TENSION_SCALE for fit in fits):
+        return None
+    motion = calibration_motion()
+    time = np.arange(motion.samples) / CALIBRATION_RATE
+    angle, _ = motion.signal(time)
+    joints = {f'joint_{k}': fit.parameters.joint for k, fit in enumerate(fits)}
+    command = np.repeat(gear * angle[:, None], len(joints), axis=1)
+    bending = simulate(PlantDescription(joints=joints), command).bending_true
+    settled = time >= motion.signal.steady[0]
+    try:
+        widths = [width_at_mid_height(angle[settled], each[settled]) for each in bending.T]
+    except NoLoopError:
+        return None
+    return float(np.mean(widths))
+
+
+def lost_pretension(fits: Sequence[PlantFit]) -> list[float]:
+    """What each joint's wires have less pretension by than the rigs that are known, N."""
+    least = min(shipped_family().joint(CENTRE).pretension, JointParameters().pretension)
+    return [max(0.0, least - fit.parameters.joint.pretension) for fit in fits]
 
 
 def _checked(

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 NAME = 'calibration: hysteresis class'
 NONE_OF_THEM = 'none'
 REACH = 'reach.'
+TOLD_N = 0.05
+"""Less is no tenth of a newton in words."""
 
 
 def successful_result(
@@ -37,12 +39,13 @@ def successful_result(
     limits: MotorLimits,
     plants: Sequence[PhysicalParameters] = (),
     zeros: 'NDArray[np.float64] | None' = None,
+    lost: Sequence[float] | None = None,
 ) -> DiagnosticArray:
     """Say which class was found; `backlash`, in rad, is None where the tracker could not measure.
 
     `duration`, of the whole calibration, is in s; how far the plants can be bent follows from the
-    rig's `limits`; `zeros` is what the zero of each load cell is off
-    by, in N.
+    rig's `limits`; `zeros` is what the zero of each load cell is off by, in N, and `lost` what the
+    wires of each joint have lost of their pretension, in N, where the plant named the class.
     """
     values: dict[str, object] = {'class_deg': verdict.class_deg, 'probability': verdict.probability}
     values |= {f'probability_{size}_deg': p for size, p in verdict.probabilities.items()}
@@ -50,7 +53,11 @@ def successful_result(
     values |= {
         'backlash_size': size,
         'backlash_size_deg': math.degrees(size),
-        'backlash_size_from': 'cnn' if backlash is None else 'tracker',
+        'backlash_size_from': 'tracker'
+        if backlash is not None
+        else 'cnn'
+        if lost is None
+        else 'plant',
     }
     if verdict.size is not None and verdict.interval is not None:
         values |= {
@@ -60,12 +67,14 @@ def successful_result(
         }
     values['duration'] = duration
     values |= _zero_values(zeros)
+    values |= {f'pretension_lost.{joint}': x for joint, x in zip(JOINTS, lost or (), strict=False)}
     if plants:
         values |= plant_values(plants)
         for joint, plant in zip(JOINTS, plants, strict=True):
             tube = bending_range(plant.joint, limits)
             values |= {f'{REACH}{joint}.low': tube.low, f'{REACH}{joint}.high': tube.high}
     message = f'class {verdict.class_deg} deg with probability {verdict.probability:.3f}'
+    message += lost_in_words(lost)
     return _message(stamp_ns, OK, with_zeros(message, zeros), values)
 
 
@@ -91,6 +100,15 @@ def refused_result(
         **_zero_values(zeros),
     }
     return _message(stamp_ns, ERROR, with_zeros(reason, zeros), values)
+
+
+def lost_in_words(lost: Sequence[float] | None) -> str:
+    """That the plant named the class, and what wires have lost in N; empty where it did not."""
+    if lost is None:
+        return ''
+    told = [f'{joint} {x:.1f} N' for joint, x in zip(JOINTS, lost, strict=True) if x >= TOLD_N]
+    losses = f'; the wires have lost pretension ({", ".join(told)}): tighten them' if told else ''
+    return f', by the plant: the classifier knows no such tensions{losses}'
 
 
 def with_zeros(message: str, zeros: 'NDArray[np.float64] | None') -> str:

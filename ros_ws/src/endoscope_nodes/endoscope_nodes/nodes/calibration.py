@@ -23,16 +23,25 @@ from endoscope_core.classifier.classification import (
     Classifier,
     ClassifierError,
     UnseenTensionError,
+    is_of_a_class,
+    of_size,
 )
 from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_core.control import MotorLimits, PhysicalParameters
-from endoscope_core.identification.plant_fit import PlantFitError, plants_of_calibration
+from endoscope_core.identification.plant_fit import (
+    PlantFitError,
+    fits_of_calibration,
+    lost_pretension,
+    plants_of_calibration,
+    size_of_explained,
+)
 from endoscope_core.safety import StateCommand, TensionGuard
 from endoscope_core.safety.guards import TOLD_RAD
 from endoscope_core.signals import SINUSOID, calibration_motion
 from endoscope_nodes import names
 from endoscope_nodes.client.calibration_result import (
     aborted_result,
+    lost_in_words,
     numbers_of,
     refused_result,
     successful_result,
@@ -57,7 +66,7 @@ from endoscope_nodes.safety.sessions import SessionWatch
 from endoscope_nodes.safety.streams import StreamWatch
 
 _FED_NS = 100_000_000
-_Judgement = tuple[ClassificationResult, tuple[PhysicalParameters, ...]]
+_Judgement = tuple[ClassificationResult, tuple[PhysicalParameters, ...], list[float] | None]
 
 
 class CalibrationNode(EndoscopeNode):
@@ -279,13 +288,24 @@ class CalibrationNode(EndoscopeNode):
             self._judging.set_exception(error)
 
     def _judgement(self, classifier: Classifier, tension: np.ndarray) -> _Judgement:
-        """What the tensions (N, 4) say; the plant is not looked for in a tube that is refused."""
-        verdict = classifier.classify(tension)
-        if not self._settings.identify_plant:
-            return verdict, ()
+        """What the tensions (N, 4) say, by the plant where the classifier knows none such."""
         time = np.arange(len(tension)) * TICK_NS * 1e-9
         command, _ = self._motion.signal(time)
-        return verdict, plants_of_calibration(command, tension, self.rig.joints.gear)
+        gear = self.rig.joints.gear
+        try:
+            verdict = classifier.classify(tension)
+        except UnseenTensionError:
+            if not self._settings.identify_plant:
+                raise
+            fits = fits_of_calibration(command, tension, gear)
+            size = size_of_explained(fits, gear)
+            if size is None or not is_of_a_class(size, classifier.classes_deg):
+                raise
+            verdict = of_size(size, classifier.classes_deg)
+            return verdict, tuple(fit.parameters for fit in fits), lost_pretension(fits)
+        if not self._settings.identify_plant:
+            return verdict, (), None
+        return verdict, plants_of_calibration(command, tension, gear), None
 
     def _finish(self, run: CalibrationRun) -> None:
         if self._homing:
@@ -304,7 +324,7 @@ class CalibrationNode(EndoscopeNode):
         if isinstance(trouble, ClassifierError | PlantFitError):
             self._abort(str(trouble), OrderCode.NOT_JUDGED)
             return
-        verdict, plants = self._judging.result()
+        verdict, plants, lost = self._judging.result()
         backlash = None
         # Backlash size is that under the sinusoid: faster motion has a wider loop.
         if run.record is not None and self._motion.name == SINUSOID:
@@ -313,12 +333,20 @@ class CalibrationNode(EndoscopeNode):
         duration = (now - self._began_ns) * 1e-9
         self._publish(
             successful_result(
-                now, verdict, backlash, duration, MotorLimits.of(self.rig), plants, self._zeros
+                now,
+                verdict,
+                backlash,
+                duration,
+                MotorLimits.of(self.rig),
+                plants,
+                self._zeros,
+                lost,
             )
         )
         self._run = None
         self._runs += 1
-        self._tell(with_zeros(f'class {verdict.class_deg} deg', self._zeros))
+        named = f'class {verdict.class_deg} deg{lost_in_words(lost)}'
+        self._tell(with_zeros(named, self._zeros))
         self.get_logger().info(f'{self._last}, probability {verdict.probability:.3f}')
 
     def _finish_homing(self) -> None:
