@@ -7,7 +7,6 @@ import pytest
 
 from endoscope_core.control import (
     AdaptiveBacklashController,
-    TrackerFeedback,
     TrackerMeasurement,
 )
 from endoscope_core.control.limits import SHARE_OF_TRAVEL
@@ -118,35 +117,6 @@ def test_the_first_measurement_after_a_gap_teaches_nothing():
     drive.tick += -drive.tick % PERIOD
     drive.run(TICK, math.sin)
     assert drive.controller.learnt == learnt
-
-
-class Heard:
-    """A law that corrects by how often it was asked, and keeps what it is to learn from."""
-
-    def __init__(self):
-        self.said, self.learnt = 0.0, []
-
-    def learn(self, *given):
-        self.learnt.append(given)
-
-    def correction(self, desired, direction, dt):
-        self.said += 1e-3
-        return self.said
-
-
-def test_a_law_learns_from_the_correction_that_was_answered_and_from_no_future():
-    timing = AdaptiveBacklashController(1).timing
-    feedback = TrackerFeedback(1, timing, Heard)
-    feedback.activate()
-    corrections = []
-    for k in range(400):
-        time = k * TICK
-        heard = TrackerMeasurement(time + (5.0 if k == 399 else 0.0), [0.0]) if k % 7 == 0 else None
-        corrections.append(feedback.step(time, [time], [1.0], heard)[0])
-    [law] = feedback.laws
-    answered = corrections[392 - round(timing.response_delay / TICK)]
-    assert law.learnt[-1][1] == pytest.approx(answered, abs=1e-9)
-    assert feedback.refused == 1
 
 
 def test_switched_off_the_correction_fades_to_nothing_as_it_moves():

@@ -2,7 +2,6 @@
 
 from endoscope_core.choices import ADAPTIVE_PHYSICAL, MODES, PHYSICAL
 from endoscope_core.control.adaptive_backlash import (
-    AdaptiveBacklashController,
     AdaptiveBacklashSettings,
 )
 from endoscope_core.control.adopted_plant import (
@@ -18,7 +17,7 @@ from endoscope_core.control.internal_model import PhysicalParameters, bending_ra
 from endoscope_core.control.limits import MotorLimits
 from endoscope_core.control.physical_inverse import AdaptivePhysicalInverse, PhysicalInverse
 from endoscope_core.control.plant_learning import PlantLearning, PlantLearningSettings
-from endoscope_core.control.tracker_feedback import TrackerFeedback, TrackerMeasurement
+from endoscope_core.control.tracker_feedback import AdaptiveBacklashController, TrackerMeasurement
 
 __all__ = [
     'ADAPTIVE_PHYSICAL',
@@ -41,7 +40,6 @@ __all__ = [
     'PhysicalParameters',
     'PlantLearning',
     'PlantLearningSettings',
-    'TrackerFeedback',
     'TrackerMeasurement',
     'adopted_plant',
     'bending_range',

@@ -17,15 +17,20 @@ motion has taken up)::
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from endoscope_core.control.limits import COUNT, limited
-from endoscope_core.control.tracker_feedback import (
-    FADE_TIME,
-    STALE_AFTER,
-    TrackerFeedback,
-    check_settings,
-)
+
+
+def check_settings(settings: object, positive: Sequence[str]) -> None:
+    """Refuse a setting that is not finite, or negative, or zero though among `positive`."""
+    for name, value in vars(settings).items():
+        if not (math.isfinite(value) and value >= 0.0):
+            raise ValueError(f'{name} = {value} must be finite and not negative')
+    for name in positive:
+        if getattr(settings, name) == 0.0:
+            raise ValueError(f'{name} must be positive')
 
 
 @dataclass(frozen=True)
@@ -138,9 +143,7 @@ class AdaptiveBacklashJoint:
         self.state = AdaptationState()
         self._robust = 0.0
 
-    def learn(
-        self, error: float, correction: float, desired: float, direction: float, dt: float
-    ) -> None:
+    def learn(self, error: float, desired: float, direction: float, dt: float) -> None:
         self.state = adapt(self.settings, self.state, error, desired, direction, dt)
 
     def correction(self, desired: float, direction: float, dt: float) -> float:
@@ -153,32 +156,3 @@ class AdaptiveBacklashJoint:
         blend = min(1.0, dt / self.settings.filter_time)
         self._robust += blend * (robust_term(self.settings, self.state) - self._robust)
         return learnt_term(self.state, desired, direction) + self._robust
-
-
-class AdaptiveBacklashController(TrackerFeedback[AdaptiveBacklashJoint]):
-    """Adaptive backlash law of the second paper (section 2.4) on every joint.
-
-    `stale_after` and `fade_time` in s: see `TrackerFeedback`.
-    """
-
-    def __init__(
-        self,
-        joints: int,
-        settings: AdaptiveBacklashSettings | None = None,
-        stale_after: float = STALE_AFTER,
-        fade_time: float = FADE_TIME,
-    ) -> None:
-        chosen = settings or AdaptiveBacklashSettings()
-        super().__init__(
-            joints, chosen, lambda: AdaptiveBacklashJoint(chosen), stale_after, fade_time
-        )
-
-    @property
-    def estimates(self) -> tuple[AdaptationState, ...]:
-        """What has been learnt, for each joint."""
-        return tuple(law.state for law in self.laws)
-
-    @property
-    def learnt(self) -> tuple[tuple[float, float], ...]:
-        """Gain and backlash (rad) that the correction adds, for each joint."""
-        return tuple((law.state.gain, law.state.backlash) for law in self.laws)

@@ -5,13 +5,17 @@ from __future__ import annotations
 import bisect
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.control.adaptive_backlash import (
+    AdaptationState,
+    AdaptiveBacklashJoint,
+    AdaptiveBacklashSettings,
+)
 from endoscope_core.control.limits import SHARE_OF_TRAVEL, Play, limited, worked_off
 from endoscope_core.hysteresis.bouc_wen import bouc_wen_normalised_step
 
@@ -25,70 +29,12 @@ RATE = 0.5
 HISTORY = 0.6
 
 
-def check_settings(settings: object, positive: Sequence[str]) -> None:
-    """Refuse a setting that is not finite, or negative, or zero though among `positive`."""
-    for name, value in vars(settings).items():
-        if not (math.isfinite(value) and value >= 0.0):
-            raise ValueError(f'{name} = {value} must be finite and not negative')
-    for name in positive:
-        if getattr(settings, name) == 0.0:
-            raise ValueError(f'{name} must be positive')
-
-
 @dataclass(frozen=True)
 class TrackerMeasurement:
     """Bending angles (J,) in rad that held at `stamp` (s, on the clock of the desired angles)."""
 
     stamp: float
     angle: Vector
-
-
-class FeedbackTiming(Protocol):
-    """What the settings of every law say about time and reach."""
-
-    @property
-    def lead(self) -> float:
-        """S by which the desired angle is foreseen, as in the feed-forward."""
-        ...
-
-    @property
-    def response_delay(self) -> float:
-        """S from command to answer."""
-        ...
-
-    @property
-    def direction_travel(self) -> float:
-        """Rad of desired motion over which the direction memory turns round."""
-        ...
-
-    @property
-    def dead_band(self) -> float:
-        """Rad by which the foreseen angle may turn back without any effect."""
-        ...
-
-    @property
-    def output_limit(self) -> float:
-        """Limit of the correction, rad."""
-        ...
-
-
-class JointLaw(Protocol):
-    """What is learnt of one joint and what it says is missing."""
-
-    def learn(
-        self, error: float, correction: float, desired: float, direction: float, dt: float
-    ) -> None:
-        """Learn from one measurement, `dt` s after the one before.
-
-        `error` in rad is the measured less the desired angle at the instant of the measurement; the
-        correction in force (rad), the desired angle (rad) and the direction memory are what it
-        answers to.
-        """
-        ...
-
-    def correction(self, desired: float, direction: float, dt: float) -> float:
-        """Correction in rad for the desired angle (rad) and direction, `dt` s after the last."""
-        ...
 
 
 @dataclass
@@ -110,8 +56,8 @@ class _Output:
     rested: bool = True
 
 
-class TrackerFeedback[Law: JointLaw]:
-    """A learning law on every joint, safe to switch at any time.
+class AdaptiveBacklashController:
+    """The adaptive backlash law on every joint, safe to switch at any time.
 
     The correction is to be added to the joint-equivalent feed-forward command. A measurement is
     compared with what was desired at its own stamp, so that a late tracker is no error. While the
@@ -128,8 +74,7 @@ class TrackerFeedback[Law: JointLaw]:
     def __init__(
         self,
         joints: int,
-        timing: FeedbackTiming,
-        new_law: Callable[[], Law],
+        settings: AdaptiveBacklashSettings | None = None,
         stale_after: float = STALE_AFTER,
         fade_time: float = FADE_TIME,
     ) -> None:
@@ -137,8 +82,7 @@ class TrackerFeedback[Law: JointLaw]:
             raise ValueError(
                 f'stale_after = {stale_after} s and fade_time = {fade_time} s must be positive'
             )
-        self.timing = timing
-        self._new_law = new_law
+        self.settings = settings or AdaptiveBacklashSettings()
         self.refused = 0
         self._joints = joints
         self._none = (0.0,) * joints
@@ -147,7 +91,7 @@ class TrackerFeedback[Law: JointLaw]:
         self._activated = False
         self._outputs = [_Output() for _ in range(joints)]
         self._plays: list[Play] = []
-        self._laws = [new_law() for _ in range(joints)]
+        self._laws = self._new_laws(joints)
         self._last_stamp = -math.inf
         self._history: deque[_Desired] = deque()
 
@@ -162,9 +106,17 @@ class TrackerFeedback[Law: JointLaw]:
         return all(output.weight == output.offset == 0.0 for output in self._outputs)
 
     @property
-    def laws(self) -> tuple[Law, ...]:
-        """The laws with what they have learnt, for each joint."""
-        return tuple(self._laws)
+    def estimates(self) -> tuple[AdaptationState, ...]:
+        """What has been learnt, for each joint."""
+        return tuple(law.state for law in self._laws)
+
+    @property
+    def learnt(self) -> tuple[tuple[float, float], ...]:
+        """Gain and backlash (rad) that the correction adds, for each joint."""
+        return tuple((law.state.gain, law.state.backlash) for law in self._laws)
+
+    def _new_laws(self, joints: int) -> list[AdaptiveBacklashJoint]:
+        return [AdaptiveBacklashJoint(self.settings) for _ in range(joints)]
 
     def activate(self) -> None:
         """Begin to learn, and to correct as soon as the tracker is fresh."""
@@ -179,7 +131,7 @@ class TrackerFeedback[Law: JointLaw]:
 
         What the correction held of it is worked off as the desired angle moves.
         """
-        self._laws = [self._new_law() for _ in range(self._joints)]
+        self._laws = self._new_laws(self._joints)
 
     def restart(self) -> None:
         """Begin a new stream of desired angles; what has been learnt stays."""
@@ -221,7 +173,7 @@ class TrackerFeedback[Law: JointLaw]:
 
     def _correct(self, j: int, before: _Desired, now: _Desired, acting: bool, dt: float) -> float:
         law, output = self._laws[j], self._outputs[j]
-        limit = self.timing.output_limit
+        limit = self.settings.output_limit
         travel = abs(now.foreseen[j] - before.foreseen[j])
         output.rested = output.rested and travel == 0.0
         # What the law says now where it was before: the difference was learnt, not asked for.
@@ -249,14 +201,14 @@ class TrackerFeedback[Law: JointLaw]:
         return dt
 
     def _remember(self, time: float, angle: list[float], speed: list[float]) -> None:
-        ahead = [a + self.timing.lead * v for a, v in zip(angle, speed, strict=True)]
+        ahead = [a + self.settings.lead * v for a, v in zip(angle, speed, strict=True)]
         if not self._plays:
-            self._plays = [Play(0.5 * self.timing.dead_band, a) for a in ahead]
+            self._plays = [Play(0.5 * self.settings.dead_band, a) for a in ahead]
         foreseen = tuple(play.follow(a) for play, a in zip(self._plays, ahead, strict=True))
         if self._history:
             last = self._history[-1]
             direction = tuple(
-                direction_step(self.timing.direction_travel, s, new - old)
+                direction_step(self.settings.direction_travel, s, new - old)
                 for s, new, old in zip(last.direction, foreseen, last.foreseen, strict=True)
             )
         else:
@@ -284,7 +236,7 @@ class TrackerFeedback[Law: JointLaw]:
         if dt > self._stale_after:
             return
         then = self._at(stamp)
-        answered = self._at(stamp - self.timing.response_delay)
+        answered = self._at(stamp - self.settings.response_delay)
         if not self._activated or then is None or answered is None:
             return
         for j, law in enumerate(self._laws):
@@ -292,7 +244,6 @@ class TrackerFeedback[Law: JointLaw]:
                 continue
             law.learn(
                 measured[j] - then.angle[j],
-                answered.correction[j],
                 answered.foreseen[j],
                 answered.direction[j],
                 dt,

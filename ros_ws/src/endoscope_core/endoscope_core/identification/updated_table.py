@@ -193,7 +193,7 @@ class UpdatedTable:
             'entries': [
                 {
                     'size': entry.size,
-                    'parameters': parameters_to_dict(entry.parameters),
+                    'parameters': dict(entry.parameters.to_dict()),
                     'source': entry.source,
                 }
                 for entry in self.entries
@@ -235,11 +235,6 @@ class _File:
     model: str
     entries: tuple[_Entry, ...]
     schema: Any = 1
-
-
-def parameters_to_dict(parameters: LawParameters) -> dict[str, Any]:
-    """Parameters of any model by name."""
-    return dict(parameters.to_dict())
 
 
 def parameters_from_dict(model: str, values: Mapping[str, Any]) -> LawParameters:

@@ -16,7 +16,6 @@ from endoscope_core.identification.updated_table import (
     KINDS,
     LawParameters,
     blend_joints,
-    parameters_to_dict,
 )
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import CALIBRATION_RATE
@@ -139,7 +138,7 @@ def class_parameter_sets(
 def _rounded(parameters: LawParameters) -> dict[str, object]:
     return {
         name: [_short(v) for v in value] if isinstance(value, list) else _short(value)
-        for name, value in parameters_to_dict(parameters).items()
+        for name, value in parameters.to_dict().items()
     }
 
 
