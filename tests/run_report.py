@@ -123,9 +123,10 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
     """Add up, in the process that all reports come to."""
     file = report.nodeid.partition('::')[0]
     _seconds[report.nodeid] += report.duration
-    _cpu[file] += report.cpu
-    if report.loop:
-        _loops.append(report.loop)
+    # The report of a process that died has neither.
+    _cpu[file] += getattr(report, 'cpu', 0.0)
+    if loop := getattr(report, 'loop', 0.0):
+        _loops.append(loop)
 
 
 @pytest.hookimpl(tryfirst=True)
