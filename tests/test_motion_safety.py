@@ -384,9 +384,9 @@ def test_unusable_handle_messages_are_counted_and_said():
         handle.send([math.nan, 0.0], session='')
         handle.send([0.0, 0.0], session='', name=['elbow', 'wrist'])
         graph.advance(1.1)
-        told = [s.message for s in graph.diagnostics['console: commands']]
+        told = [s.message for s in graph.diagnostics['master: commands']]
         assert any('elbow' in message or 'not finite' in message for message in told)
-        values = graph.reported('console: commands')
+        values = graph.reported('master: commands')
         assert values['handle refused: not finite'] == values['handle refused: malformed'] == '1'
 
 
@@ -401,7 +401,7 @@ def test_a_handle_that_nothing_follows_is_said_with_what_to_do(source):
         assert not said
         handle.move(3.0, (0.05, 0.0), clutch=False)
         advice = 'endoscope operate set master.source master'
-        told = graph.diagnostics['console: commands'][-1]
+        told = graph.diagnostics['master: commands'][-1]
         assert told.level == WARN
         assert told.message == (
             f"the handle moves and nothing follows it: the master's source is {source}; {advice}"
@@ -409,7 +409,7 @@ def test_a_handle_that_nothing_follows_is_said_with_what_to_do(source):
         assert said == [told.message]
         graph.set('master', source='master')
         handle.move(2.1, (0.05, 0.0), clutch=False)
-        assert advice not in graph.diagnostics['console: commands'][-1].message
+        assert advice not in graph.diagnostics['master: commands'][-1].message
         assert len(said) == 1
 
 
@@ -417,10 +417,10 @@ def test_a_clutch_that_holds_nothing_is_said_unless_a_program_commands_the_slave
     with run() as graph:
         handle = Handle(graph)
         handle.move(1.1)
-        assert 'has its clutch held' in graph.diagnostics['console: commands'][-1].message
+        assert 'has its clutch held' in graph.diagnostics['master: commands'][-1].message
         graph.speak(JointState, SLAVE_COMMAND, COMMAND)
         handle.move(1.1)
-        assert graph.diagnostics['console: commands'][-1].level == OK
+        assert graph.diagnostics['master: commands'][-1].level == OK
 
 
 def test_a_handle_that_falls_silent_stands_and_is_taken_up_where_the_slave_is():

@@ -69,5 +69,5 @@ MARKS, LAST_EVENT = 'marks', 'last bag'
 BAG = 'bag'
 # What `watch: rig` says there first, until it can judge.
 LEARNING = 'learning'
-# What `console: commands` says there of a motion that it plays.
+# What `master: commands` says there of a motion that it plays.
 FINISHED = 'finished'
