@@ -134,8 +134,10 @@ def test_a_stranger_is_led_to_the_first_motion(console, browser):
 def lead(console, page):
     shows(page, 'next', 'Take the controls. Nothing moves yet.')
     shows(page, 'operator', 'nobody')
-    for name in ('pause', 'enable', 'home', 'disable', 'calibrate', 'compensator'):
+    for name in ('enable', 'home', 'disable', 'calibrate', 'compensator'):
         expect(page.locator(f'#{name}')).to_be_disabled()
+    # Whoever may operate may end motion, always.
+    expect(page.locator('#pause')).to_be_enabled()
     page.get_by_role('button', name='Take the controls').click()
     shows(page, 'next', re.compile('^Hold Enable for 1 s'))
     hold_enable(page)
