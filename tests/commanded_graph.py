@@ -108,7 +108,7 @@ class Moved:
     """What goals and shafts have done since."""
 
     def __init__(self, graph):
-        self._clock = graph.clock
+        self._graph, self._clock = graph, graph.clock
         self.goals = graph.listen(MOTOR_COMMAND, MOTORS)
         self.shafts = graph.listen('motor/measured_js', MOTORS)
         self._bending = graph.listen('simulation/bending')
@@ -129,6 +129,9 @@ class Moved:
         return self._way(self._bending)
 
     def _way(self, samples):
+        # Who joins a running stream may be given its first samples late, and all at once.
+        lately_ns = self._clock.now_ns - 2 * round(TICK_S * 1e9)
+        self._graph.wait(lambda: samples and samples[-1].stamp_ns >= lately_ns)
         since = [s.position for s in samples if s.stamp_ns >= self._since_ns]
         return float(np.ptp(since, axis=0).max())
 
