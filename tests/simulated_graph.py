@@ -12,9 +12,7 @@ from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
 from endoscope_nodes.names import (
     CALIBRATION_RESULT,
     CALIBRATION_RUN,
-    CLOCK_NODE,
     JOINTS,
-    MASTER_NODE,
 )
 from endoscope_nodes.nodes.simulation_clock import SimulationClockNode
 from endoscope_nodes.runtime.private_domain import private_domain
@@ -179,5 +177,4 @@ class SimulatedGraph(ProbedGraph):
 
 def node_name(factory: type) -> str:
     """Name of the node that a class makes, by its module."""
-    module = factory.__module__.rpartition('.')[2]
-    return {'master': MASTER_NODE, 'simulation_clock': CLOCK_NODE}.get(module, module)
+    return factory.__module__.rpartition('.')[2]

@@ -15,21 +15,13 @@ from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from endoscope_lab.faults.node_processes import NODES as ALL_BUT_SHOWN
 from endoscope_nodes.program import PROGRAMS
 from endoscope_nodes.runtime.private_domain import private_domain
 from endoscope_nodes.runtime.qos import EVENT, SENSOR_ASKED
 
 DOMAIN = private_domain()
-NODES = (
-    'motor_driver',
-    'load_cells',
-    'em_tracker',
-    'supervisor',
-    'compensator',
-    'controller',
-    'calibration',
-    'master',
-)
+NODES = tuple(node for node in ALL_BUT_SHOWN if node != 'recorder')
 PATIENCE_S = 300.0
 RIG = 'timeouts: {command: 1.0, stream: 10.0, handle: 1.0}'
 """Time-outs that a busy machine can keep."""

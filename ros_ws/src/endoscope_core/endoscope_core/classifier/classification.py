@@ -92,11 +92,16 @@ def is_of_a_class(size: float, classes_deg: Sequence[int]) -> bool:
     return abs(nearest - size) <= HALF_CLASS
 
 
-def of_size(size: float, classes_deg: Sequence[int]) -> ClassificationResult:
-    """The class of a tube whose backlash size in rad its plant has told."""
+def of_size(
+    size: float,
+    deviation: float,
+    classes_deg: Sequence[int],
+    interval: tuple[float, float] | None = None,
+) -> ClassificationResult:
+    """The class of a tube by its backlash size, known to a standard `deviation`, all in rad."""
     borders = [math.radians(each) - HALF_CLASS for each in classes_deg[1:]]
-    told = NormalDist(size, PLANT_DEVIATION)
-    below = [0.0, *(told.cdf(border) for border in borders), 1.0]
+    likely = NormalDist(size, deviation)
+    below = [0.0, *(likely.cdf(border) for border in borders), 1.0]
     each = dict(zip(classes_deg, np.diff(below).tolist(), strict=True))
     nearest = nearest_class(size, classes_deg)
-    return ClassificationResult(nearest, each[nearest], each, size)
+    return ClassificationResult(nearest, each[nearest], each, size, interval)

@@ -15,7 +15,7 @@ from endoscope_core.classifier.classification import (
     ClassificationResult,
     UnseenTensionError,
     checked_tension,
-    nearest_class,
+    of_size,
 )
 from endoscope_core.signals import calibration_motion
 
@@ -207,20 +207,13 @@ class CnnClassifier:
 
     def results(self, judgement: Judgement) -> list[ClassificationResult]:
         """Result for each of R recordings, whether it is to be refused or not."""
-        borders = np.deg2rad(self.classes_deg[1:]) - HALF_CLASS
         spread = self._half_width(judgement) / _NORMAL.inv_cdf(0.5 + 0.5 * LEVEL)
-        found = []
-        for size, deviation, interval in zip(
-            judgement.size.tolist(), spread.tolist(), self._intervals(judgement), strict=True
-        ):
-            below = [_NORMAL.cdf((border - size) / deviation) for border in borders.tolist()]
-            weights = np.diff([0.0, *below, 1.0]).tolist()
-            probabilities = dict(zip(self.classes_deg, weights, strict=True))
-            nearest = nearest_class(size, self.classes_deg)
-            found.append(
-                ClassificationResult(nearest, probabilities[nearest], probabilities, size, interval)
+        return [
+            of_size(size, deviation, self.classes_deg, interval)
+            for size, deviation, interval in zip(
+                judgement.size.tolist(), spread.tolist(), self._intervals(judgement), strict=True
             )
-        return found
+        ]
 
     def _gap(self, courses: Single) -> Array:
         """By how much wires' tensions differ from those a whole period later, N."""

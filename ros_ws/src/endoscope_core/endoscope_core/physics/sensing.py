@@ -25,8 +25,7 @@ the tracker's `slave/measured_js` with `tracker/measured_cp`."""
 
 def quantise(values: ArrayLike, step: float) -> Array:
     """Round to multiples of `step`; a step of zero leaves the values as they are."""
-    values = np.asarray(values, dtype=float)
-    return values if step == 0 else np.round(values / step) * step
+    return _read(values, 0.0, None, step)
 
 
 class SensorModel:
@@ -55,11 +54,11 @@ class SensorModel:
 
     def shaft_position(self, angle: ArrayLike) -> Array:
         """Encoder reading in rad."""
-        return _read(angle, 0.0, None, 2.0 * math.pi / self._sensors.encoder_counts)
+        return quantise(angle, 2.0 * math.pi / self._sensors.encoder_counts)
 
     def shaft_velocity(self, speed: ArrayLike) -> Array:
         """Servo's velocity reading in rad/s."""
-        return _read(speed, 0.0, None, self._sensors.velocity_resolution)
+        return quantise(speed, self._sensors.velocity_resolution)
 
     def shaft_effort(self, effort: ArrayLike) -> Array:
         """Torque in N m from the servo's current."""

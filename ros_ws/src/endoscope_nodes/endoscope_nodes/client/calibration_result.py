@@ -50,14 +50,13 @@ def successful_result(
     values: dict[str, object] = {'class_deg': verdict.class_deg, 'probability': verdict.probability}
     values |= {f'probability_{size}_deg': p for size, p in verdict.probabilities.items()}
     size = verdict.expected_size if backlash is None else backlash
+    source = 'cnn' if lost is None else 'plant'
+    if backlash is not None:
+        source = 'tracker'
     values |= {
         'backlash_size': size,
         'backlash_size_deg': math.degrees(size),
-        'backlash_size_from': 'tracker'
-        if backlash is not None
-        else 'cnn'
-        if lost is None
-        else 'plant',
+        'backlash_size_from': source,
     }
     if verdict.size is not None and verdict.interval is not None:
         values |= {

@@ -19,6 +19,7 @@ from endoscope_core.calibration import (
     zero_errors,
 )
 from endoscope_core.classifier.classification import (
+    PLANT_DEVIATION,
     ClassificationResult,
     Classifier,
     ClassifierError,
@@ -301,7 +302,7 @@ class CalibrationNode(EndoscopeNode):
             size = size_of_explained(fits, gear)
             if size is None or not is_of_a_class(size, classifier.classes_deg):
                 raise
-            verdict = of_size(size, classifier.classes_deg)
+            verdict = of_size(size, PLANT_DEVIATION, classifier.classes_deg)
             return verdict, tuple(fit.parameters for fit in fits), lost_pretension(fits)
         if not self._settings.identify_plant:
             return verdict, (), None
