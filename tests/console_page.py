@@ -6,10 +6,11 @@ import time
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 
+from page_frames import decode_telemetry, encode_input
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from endoscope_console.teleop.frames import InputFrame, decode_telemetry, encode_input
+from endoscope_console.teleop.frames import InputFrame
 
 PERIOD_S = 0.02
 _PATIENCE_S = 60.0

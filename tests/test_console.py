@@ -14,6 +14,7 @@ import pytest
 from console_page import Page
 from console_rig import ConsoleRig, Server, engage, ready
 from diagnostic_msgs.msg import DiagnosticArray
+from page_frames import encode_input
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Joy
 from short_bags import PLANT, write_short_bag
@@ -22,7 +23,7 @@ from websockets.sync.client import connect
 
 from endoscope_console.clients import FRAMES_A_SECOND, UNANSWERED
 from endoscope_console.explanations import EXPERIMENT_FILE, REPORT_FILE
-from endoscope_console.teleop.frames import InputFrame, encode_input
+from endoscope_console.teleop.frames import InputFrame
 from endoscope_core.physics import save_plant
 from endoscope_core.signals.command_file import write_command_file
 from endoscope_nodes.client.graph_client import joined_graph

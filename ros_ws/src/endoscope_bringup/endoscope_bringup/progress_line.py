@@ -4,7 +4,6 @@ import shutil
 import sys
 import threading
 import time
-from types import TracebackType
 from typing import Self, TextIO
 
 WIDTH = 20
@@ -14,15 +13,15 @@ REDRAWN_S = 1.0
 class ProgressLine:
     """A bar of one line that says which step is under way, and for how long already.
 
-    `steps` is about how many there are: a bar is full only when all is done. Where `stream`
-    (default: stderr) is no terminal, each step is a line, but not the `first`, which begins at
-    once: bad input is refused in it, with one line alone.
+    `steps` is about how many there are, where :meth:`show` does not say the share: a bar is full
+    only when all is done. Where `stream` (default: stderr) is no terminal, each step is a line, but
+    not the `first`, which begins at once: bad input is refused in it, with one line alone.
     """
 
-    def __init__(self, steps: int, first: str, stream: TextIO | None = None) -> None:
+    def __init__(self, steps: int = 1, first: str = '', stream: TextIO | None = None) -> None:
         self._stream = sys.stderr if stream is None else stream
         self._steps = steps
-        self._done = 0
+        self._done = 0.0
         self._step = first
         self._begun = time.monotonic()
         self._ended = threading.Event()
@@ -37,12 +36,7 @@ class ProgressLine:
             self._clock.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Take the bar away."""
         self._ended.set()
         if self._shows:
@@ -60,6 +54,17 @@ class ProgressLine:
                 self._write(f'\r\x1b[K{text}\n' if self._shows else f'{text}\n')
             if self._shows:
                 self._draw()
+
+    def show(self, step: str, share: float) -> None:
+        """Say which step it is at, and the share of all that is done."""
+        with self._lock:
+            self._done = share * self._steps
+            if self._shows:
+                self._step = step
+                self._draw()
+            elif step != self._step:
+                self._step = step
+                self._write(f'{step}\n')
 
     def print(self, text: str, file: TextIO) -> None:
         """Print what was found above the bar."""
@@ -83,27 +88,3 @@ class ProgressLine:
     def _write(self, text: str) -> None:
         self._stream.write(text)
         self._stream.flush()
-
-
-class ShareBar:
-    """Shows on stderr how far something is: one line that changes or, unwatched, one a step."""
-
-    def __init__(self) -> None:
-        self._shows = sys.stderr.isatty()
-        self._step = ''
-
-    def __call__(self, step: str, share: float) -> None:
-        """Say which step it is at, and the share that is done."""
-        if self._shows:
-            done = round(20 * share)
-            bar = '#' * done + '.' * (20 - done)
-            print(f'\r[{bar}] {100 * share:3.0f} %  {step:<18}', end='', file=sys.stderr)
-        elif step != self._step:
-            print(step, file=sys.stderr)
-        sys.stderr.flush()
-        self._step = step
-
-    def end(self) -> None:
-        """Leave the line."""
-        if self._shows and self._step:
-            print(file=sys.stderr)

@@ -39,6 +39,19 @@ def test_in_a_terminal_a_bar_says_what_is_done_and_goes():
     assert found == 'found\n'
 
 
+def test_where_shares_are_said_each_step_is_a_line_once():
+    for stream in (io.StringIO(), Terminal()):
+        with ProgressLine(stream=stream) as progress:
+            for share in (0.2, 0.3, 0.5):
+                progress.show('moving' if share < 0.5 else 'judging', share)
+        said = stream.getvalue()
+        if stream.isatty():
+            assert '[######..............] 0 s  moving' in said
+            assert '[##########..........] 0 s  judging' in said
+        else:
+            assert said == 'moving\njudging\n'
+
+
 def test_a_bar_is_full_only_when_all_is_done():
     terminal = Terminal()
     with ProgressLine(1, 'reading', terminal) as progress:

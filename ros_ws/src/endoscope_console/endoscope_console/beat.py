@@ -8,7 +8,6 @@ import threading
 import time
 from collections import deque
 from dataclasses import dataclass, field
-from types import TracebackType
 from typing import Self
 
 from rclpy.node import Node
@@ -64,12 +63,7 @@ class Beat:
         self._thread.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Release the clutch and leave the handle's topics."""
         self._asked.set()
         self._thread.join(_UNTIL_STOPPED_S)

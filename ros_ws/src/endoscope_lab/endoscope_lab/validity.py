@@ -40,8 +40,8 @@ from endoscope_lab.papers.tracking_trial import (
     run_tracking_trial,
     within_reach,
 )
+from endoscope_lab.still_pictures import STYLE, svg
 from endoscope_lab.watch.changing_rig import MovingRig, motion_of, show
-from endoscope_pages.still_pictures import STYLE, svg
 
 Array = NDArray[np.float64]
 

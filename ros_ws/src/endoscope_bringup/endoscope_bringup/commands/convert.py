@@ -55,17 +55,14 @@ def run(args: argparse.Namespace) -> int:
     """Convert and write, or say what is in the table; return 0."""
     from endoscope_bags.table_mapping import load_table_mapping
     from endoscope_bags.text_table import convert_table
-    from endoscope_bringup.progress_line import ShareBar
+    from endoscope_bringup.progress_line import ProgressLine
 
     if args.mapping is None:
         return _propose(args)
     if args.out is None or args.propose is not None:
         raise EndoscopeError('--mapping takes --out BAG, and no --propose')
-    bar = ShareBar()
-    try:
-        done = convert_table(args.table, load_table_mapping(args.mapping), args.out, bar)
-    finally:
-        bar.end()
+    with ProgressLine() as bar:
+        done = convert_table(args.table, load_table_mapping(args.mapping), args.out, bar.show)
     if args.json:
         print_json({'bag': args.out, **vars(done)})
         return 0

@@ -1,4 +1,4 @@
-"""The whole graph in this process on a simulated slave, an operator at its topics, and a hand."""
+"""The whole graph in this process on a simulated slave, and an operator at its topics."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -13,9 +13,8 @@ from endoscope_core.rig import Rig
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import GraphError
 from endoscope_nodes.client.graph_parameters import set_parameters
-from endoscope_nodes.client.handle_sender import HandleSender
 from endoscope_nodes.graph import CONTROL_NODES, SLAVE_NODES
-from endoscope_nodes.names import CLOCK_NODE, MASTER_NODE, MOTOR_MEASURED
+from endoscope_nodes.names import CLOCK_NODE, MOTOR_MEASURED
 from endoscope_nodes.nodes.recorder import RecorderNode
 from endoscope_nodes.nodes.simulation_clock import SimulationClockNode
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
@@ -118,27 +117,6 @@ class LiveGraph(ClosedOnExit):
     def set(self, node: str, **values: Any) -> None:
         """Set parameters of a node."""
         set_parameters(self.client, node, values)
-
-    def hold_handle(
-        self, angles: Callable[[float], Sequence[float]], rate: float, seconds: float
-    ) -> None:
-        """Follow a handle at a rate in Hz: angles (J,) in rad by the s since its clutch closed."""
-        self.set(MASTER_NODE, source='master')
-        hand = HandleSender(self.node)
-        try:
-            self.advance(0.3)
-            begin = self.now()
-            hand.press(True, self.node.ticker.now_ns())
-            sent = 0
-            while (since := self.now() - begin) < seconds:
-                hand.send(self.node.ticker.now_ns(), angles(since))
-                sent += 1
-                self.advance(max(0.001, sent / rate - (self.now() - begin)))
-            hand.press(False, self.node.ticker.now_ns())
-            self.advance(0.3)
-        finally:
-            hand.close()
-        self.set(MASTER_NODE, source='none')
 
     @property
     def shafts(self) -> tuple[float, ...]:

@@ -13,7 +13,7 @@ from types import FrameType
 from typing import Any
 
 from endoscope_bringup.operating.status import calibration_in_words, status_of
-from endoscope_bringup.progress_line import ShareBar
+from endoscope_bringup.progress_line import ProgressLine
 from endoscope_core.safety import ranges_in_words
 from endoscope_nodes import names
 from endoscope_nodes.client.graph_client import GraphClient
@@ -91,16 +91,14 @@ def _adopt(client: GraphClient, file: str | None, patience_s: float) -> Reply:
 
 
 def _calibrate(client: GraphClient, patience_s: float) -> Reply:
-    progress = ShareBar()
     try:
-        result = client.calibrate(progress, patience_s)
+        with ProgressLine() as bar:
+            result = client.calibrate(bar.show, patience_s)
     except GraphError as error:
         # An aborted calibration tells what it saw: the session ended. The supervisor knows why.
         if client.state == 'FAULT' and client.wait_until(lambda: bool(client.why), patience_s):
             raise GraphError(f'{error} ({client.state}: {client.why})') from error
         raise
-    finally:
-        progress.end()
     return Reply(calibration_in_words(result), {'result': result.values})
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from endoscope_core.errors import EndoscopeError
 
@@ -22,7 +22,6 @@ _KNOWN_FLAGS = 31
 # 300 years: more is no time, and no number of ns that a float tells apart.
 _LAST_S = 1e10
 _F32 = np.dtype('<f4')
-_LINE = 3 * POINTS
 
 
 class MalformedFrameError(EndoscopeError, ValueError):
@@ -55,32 +54,6 @@ class InputFrame:
     t: float  # steady time of the page in s
     x: float  # deflection, like `y`, -1 to 1; in position mode rad since the grip began
     y: float
-
-
-@dataclass(frozen=True)
-class TelemetryFrame:
-    """One picture of the slave; NaN where nothing came or is known."""
-
-    seq: int
-    stamp_s: float  # time of the graph
-    age_s: float  # of the newest sample in it
-    # (N, 3): smallest, largest and last value of each signal since the frame before.
-    ranges: NDArray[np.float32]
-    wanted: NDArray[np.float32]  # (`POINTS`, 3), commanded bending section, m
-    actual: NDArray[np.float32]  # (`POINTS`, 3), as measured, m
-
-
-def encode_input(frame: InputFrame) -> bytes:
-    """Write an input frame, 32 bytes: kind, flags, source, seq, grip, seen, t, x, y."""
-    flags = (
-        _PRESSED * frame.pressed
-        | _TURBO * frame.turbo
-        | _VISIBLE * frame.visible
-        | _FOCUSED * frame.focused
-        | _POSITION_MODE * frame.position_mode
-    )
-    numbers = frame.source, frame.seq, frame.grip, frame.seen, frame.t, frame.x, frame.y
-    return _INPUT.pack(INPUT, flags, *numbers)
 
 
 def decode_input(data: bytes) -> InputFrame:
@@ -120,7 +93,13 @@ def encode_telemetry(
     wanted: ArrayLike,
     actual: ArrayLike,
 ) -> bytes:
-    """Write a `TelemetryFrame`: kind, version, N, seq, stamp, age, N ranges and two polylines."""
+    """Write one picture of the slave: kind, version, N, seq, stamp, age, ranges, two polylines.
+
+    `stamp_s` is the time of the graph, `age_s` that of the newest sample; `ranges` (N, 3) are the
+    smallest, largest and last value of each signal since the frame before; `wanted` and `actual`
+    (`POINTS`, 3) are the bending section in m, as commanded and as measured. NaN where nothing came
+    or is known.
+    """
     of_signals, *lines = (np.asarray(array, dtype=_F32) for array in (ranges, wanted, actual))
     if of_signals.ndim != 2 or of_signals.shape[1] != 3:
         raise ValueError(f'ranges have shape (N, 3), not {of_signals.shape}')
@@ -129,27 +108,3 @@ def encode_telemetry(
             raise ValueError(f'a polyline has shape ({POINTS}, 3), not {line.shape}')
     head = _HEAD.pack(TELEMETRY, VERSION, len(of_signals), seq, stamp_s, age_s)
     return b''.join((head, of_signals.tobytes(), *(line.tobytes() for line in lines)))
-
-
-def decode_telemetry(data: bytes) -> TelemetryFrame:
-    """Read a telemetry frame; MalformedFrameError where kind, version or length is another."""
-    if len(data) < _HEAD.size:
-        raise MalformedFrameError(f'a telemetry frame has at least {_HEAD.size} bytes')
-    kind, version, count, seq, stamp_s, age_s = _HEAD.unpack_from(data)
-    if (kind, version) != (TELEMETRY, VERSION):
-        raise MalformedFrameError(
-            f'a telemetry frame is of kind {TELEMETRY}, version {VERSION}, not {kind}, {version}'
-        )
-    size = _HEAD.size + _F32.itemsize * (3 * count + 2 * _LINE)
-    if len(data) != size:
-        raise MalformedFrameError(f'a frame of {count} signals has {size} bytes, not {len(data)}')
-    numbers = np.frombuffer(data, dtype=_F32, offset=_HEAD.size)
-    ranges, wanted, actual = np.split(numbers, (3 * count, 3 * count + _LINE))
-    return TelemetryFrame(
-        seq,
-        stamp_s,
-        age_s,
-        ranges.reshape(count, 3),
-        wanted.reshape(POINTS, 3),
-        actual.reshape(POINTS, 3),
-    )

@@ -28,8 +28,8 @@ from endoscope_lab.real.explained import (
 )
 from endoscope_lab.real.rig import Told
 from endoscope_lab.real.takes import between_cycles, require_recordings
+from endoscope_lab.still_pictures import INK, STYLE, svg, thinned
 from endoscope_pages import html_table, render_page
-from endoscope_pages.still_pictures import INK, STYLE, svg, thinned
 
 PAGE = 'real.html'
 

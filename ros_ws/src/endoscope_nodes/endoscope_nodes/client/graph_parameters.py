@@ -14,7 +14,6 @@ from rcl_interfaces.srv import (
     SetParametersAtomically,
 )
 from rclpy.parameter import Parameter, parameter_value_to_python
-from rclpy.task import Future
 
 from endoscope_core.errors import nearest
 from endoscope_nodes.client.graph_client import GraphClient
@@ -140,12 +139,6 @@ def _read(
         )
         for name, descriptor, value in zip(names, descriptors, values, strict=True)
     ]
-
-
-def request_parameters(client: GraphClient, node: str, values: Mapping[str, Any]) -> Future:
-    """Ask a node to take new values of some parameters, and wait for nothing."""
-    kind, service = SetParametersAtomically, f'{node}/set_parameters_atomically'
-    return client.client(kind, service).call_async(_request(values))
 
 
 def set_parameters(

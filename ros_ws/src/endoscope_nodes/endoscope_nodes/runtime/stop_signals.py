@@ -5,7 +5,7 @@ import signal
 import socket
 import threading
 from collections.abc import Callable
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Self
 
 _WORDS = {
@@ -68,12 +68,7 @@ class StopSignals:
                 self._asked = True
                 self.on_stop()
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         signal.set_wakeup_fd(self._former_fd)
         for number, handler in self._former_handlers.items():
             # A process that was asked to stop is about to end; asked again it need not hurry.
