@@ -29,7 +29,10 @@ def rig():
     return described, true_rig(draw, described), motions.another(draw, 2)
 
 
-@pytest.mark.parametrize('stratum', STRATA)
+@pytest.mark.parametrize(
+    'stratum',
+    [pytest.param(s, marks=pytest.mark.nightly if s == 'other_simulator' else ()) for s in STRATA],
+)
 def test_every_stratum_draws_the_same_case_for_the_same_seed(stratum):
     first, again = drawn_case(stratum, SEED), drawn_case(stratum, SEED)
     assert first.true == again.true

@@ -35,7 +35,13 @@ def test_one_rig_in_four_has_two_effects_and_two_are_of_the_other_simulator():
     assert kinds == [kind_of(seed) for seed in range(8001, 8005)]
 
 
-@pytest.mark.parametrize('stratum', KINDS.values())
+@pytest.mark.parametrize(
+    'stratum',
+    [
+        pytest.param(s, marks=pytest.mark.nightly if s == 'other_simulator' else ())
+        for s in KINDS.values()
+    ],
+)
 def test_a_rig_goes_on_from_one_motion_to_the_next(stratum):
     case, read = drawn_rig(stratum, 1)
     joints = case.true.joint_names()

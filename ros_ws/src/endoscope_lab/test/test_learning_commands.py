@@ -82,6 +82,7 @@ def test_without_pytorch_one_line_says_how_to_get_it(tmp_path, monkeypatch, caps
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.nightly
 def test_identifying_a_data_set_gives_a_set_for_each_class(data, tmp_path):
     out = tmp_path / 'classes.json'
     source = [str(data), '--model', 'bouc_wen', '--per-class', '1', '--out', str(out)]

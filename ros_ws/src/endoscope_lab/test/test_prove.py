@@ -81,6 +81,7 @@ def test_a_recording_comes_back_from_its_bag(rig, tmp_path):
         np.testing.assert_allclose(getattr(again, name).time, series.time, atol=1e-9)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize('form', SIMULATORS)
 def test_the_same_seed_draws_the_same_rig(form):
     effect = 'load_cell_gain'
@@ -173,6 +174,7 @@ def test_a_slave_has_both_joints_and_nothing_that_spoils_recordings(capsys, tmp_
     assert 'mutually exclusive' in capsys.readouterr().err
 
 
+@pytest.mark.nightly
 def test_a_slave_follows_the_inverse_of_its_own_plant(tmp_path):
     plant = PlantDescription()
     run = tracked(plant, plant, tmp_path / 'tracked', 3)

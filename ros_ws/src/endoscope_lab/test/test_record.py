@@ -56,6 +56,7 @@ def test_what_differs_is_said():
     ]
 
 
+@pytest.mark.nightly
 def test_a_run_goes_on_where_it_was_stopped_and_says_what_differs(record, capsys):
     # The rows on record say what no explanation of this case would say.
     words = ['bench', 'concealed', '--against', str(record)]
