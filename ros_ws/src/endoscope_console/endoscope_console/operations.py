@@ -87,12 +87,12 @@ class Operations:
         self.counts[f'refused: {reason}'] += 1
         self.beat.refuse(client.id, reason, now_ns)
 
-    def closed(self, client: Client, why: str = 'its page was closed') -> None:
-        """Take note that a client is gone, and why."""
+    def closed(self, client: Client) -> None:
+        """Take note that a client is gone."""
         self.beat.refuse(client.id, Reason.CLOSED, time.monotonic_ns())
         if client.id == self.lease.holder:
             self.lease.release(client.id)
-            self._lease_ended(client, why)
+            self._lease_ended(client, 'its page was closed')
 
     def turn(self, now_ns: int) -> None:
         """End a silent lease, and tell the beat how things are; at a steady time in ns."""

@@ -103,12 +103,6 @@ def write_text(path: str | Path, text: str, *, overwrite: bool = True) -> None:
         partial.write_text(text, encoding='utf-8')
 
 
-def write_bytes(path: str | Path, content: bytes, *, overwrite: bool = True) -> None:
-    """Write `content` to `path`, whole or not at all; errors as in `atomic_file`."""
-    with atomic_file(path, overwrite=overwrite) as partial:
-        partial.write_bytes(content)
-
-
 @contextmanager
 def _named(target: Path) -> Iterator[None]:
     """Name the output in errors of writing, such as that of a full disk, that name no file."""

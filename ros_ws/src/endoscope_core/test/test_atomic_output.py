@@ -9,7 +9,6 @@ from endoscope_core.atomic_output import (
     atomic_file,
     require_free_directory,
     with_final_names,
-    write_bytes,
     write_text,
 )
 from endoscope_core.errors import OutputError
@@ -51,12 +50,12 @@ def test_failed_block_keeps_the_old_file_and_leaves_nothing(
 
 
 def test_file_is_not_overwritten_when_that_is_refused(tmp_path: Path) -> None:
-    target = tmp_path / 'a.bin'
-    write_bytes(target, b'old')
-    with pytest.raises(OutputError, match=r'a\.bin exists already'):
-        write_bytes(target, b'new', overwrite=False)
+    target = tmp_path / 'a.txt'
+    write_text(target, 'old')
+    with pytest.raises(OutputError, match=r'a\.txt exists already'):
+        write_text(target, 'new', overwrite=False)
     assert target.read_bytes() == b'old'
-    write_bytes(target, b'new')
+    write_text(target, 'new')
     assert target.read_bytes() == b'new'
 
 

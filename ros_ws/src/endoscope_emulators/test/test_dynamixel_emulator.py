@@ -7,6 +7,7 @@ from patient_clients import PatientPort
 
 from endoscope_devices.dynamixel import control_table as table
 from endoscope_emulators.dynamixel.bus import EmulatedBus
+from endoscope_emulators.dynamixel.control_table import CONTROL_TABLE, TABLE_SIZE
 from endoscope_emulators.dynamixel.servo import EmulatedServo, ErrorNumber
 
 ACCESS, RANGE, LENGTH, LIMIT = (
@@ -176,3 +177,10 @@ def test_the_tick_counts_milliseconds_and_begins_anew():
     assert servo.value(table.REALTIME_TICK) == 250
     servo.advance(100.0 + 32.768 + 0.007)
     assert servo.value(table.REALTIME_TICK) == 7
+
+
+def test_registers_do_not_overlap():
+    taken = [r.address + k for r in CONTROL_TABLE for k in range(r.size)]
+    assert len(taken) == len(set(taken))
+    assert max(taken) < TABLE_SIZE
+    assert len(CONTROL_TABLE) > 50

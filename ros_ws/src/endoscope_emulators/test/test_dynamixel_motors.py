@@ -12,10 +12,8 @@ from endoscope_core.rig import Kind
 from endoscope_devices.device import DeviceError
 from endoscope_devices.dynamixel.control_table import (
     ALERT,
-    BAUD_RATE,
     CURRENT_UNIT,
     GOAL_CURRENT,
-    GOAL_VELOCITY,
     MODEL_INFORMATION,
     OPERATING_MODE,
     RETURN_DELAY_TIME,
@@ -32,6 +30,7 @@ from endoscope_devices.dynamixel.packet_handler import (
 from endoscope_devices.dynamixel.serial_port import BusPort
 from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
 from endoscope_emulators.dynamixel.bus import EmulatedBus
+from endoscope_emulators.dynamixel.control_table import BAUD_RATE, GOAL_VELOCITY
 from endoscope_emulators.dynamixel.process import EmulatorProcess
 from endoscope_emulators.dynamixel.servo import EmulatedServo
 

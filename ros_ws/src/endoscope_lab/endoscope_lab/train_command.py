@@ -1,9 +1,15 @@
 """`endoscope train`: the classifier of wire tensions, from simulated rigs."""
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from endoscope_bringup.subcommands import COUNT, seed
+from endoscope_core.errors import FileError
+
+if TYPE_CHECKING:
+    import numpy as np
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -39,10 +45,11 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Train and write; return 0."""
-    from endoscope_core.classifier.weights_file import save_weights, weights_path
     from endoscope_core.signals import calibration_motion
 
-    out = weights_path(args.out)
+    out = Path(args.out)
+    if out.suffix == '.json' or out.is_dir():
+        raise FileError(f'{out} cannot hold weights: name a file with suffix .safetensors')
     calibration_motion(args.motion)
     from endoscope_lab.training.cnn_training import CnnTraining, description_of, train_cnn
 
@@ -54,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
         f'--steps {args.steps} --out {out.name}'
     )
     described = description_of(trained, settings, args.seed, command)
-    save_weights(out, trained.classifier.weights, described)
+    _save_weights(out, trained.classifier.weights, described)
     kept.unlink(missing_ok=True)
     for rate, told in trained.held_out.items():
         print(
@@ -68,3 +75,22 @@ def run(args: argparse.Namespace) -> int:
 
 def _print_line(line: str) -> None:
     print(line, flush=True)
+
+
+def _save_weights(
+    path: Path, state: Mapping[str, 'np.ndarray'], description: Mapping[str, object]
+) -> None:
+    """Write arrays, and their description to the JSON file of the same name beside them."""
+    import json
+
+    import numpy as np
+    import safetensors.numpy
+
+    from endoscope_core.atomic_output import atomic_file, write_text
+    from endoscope_core.classifier.weights_file import SCHEMA, sealed
+
+    described = {'schema': SCHEMA, 'kind': 'cnn', **description}
+    data = safetensors.numpy.save({k: np.asarray(x, order='C') for k, x in state.items()})
+    with atomic_file(path) as partial:
+        partial.write_bytes(data)
+    write_text(path.with_suffix('.json'), json.dumps(sealed(described, data), indent=1) + '\n')

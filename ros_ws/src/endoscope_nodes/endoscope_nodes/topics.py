@@ -71,6 +71,10 @@ _DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
 _STREAM = '1 kHz'
 _LATCHED_STATE = 'on change, latched'
 
+# Offered and asked.
+_SENSOR = SENSOR_OFFERED, SENSOR_ASKED
+_COMMANDS, _RESULTS, _EVENTS, _LOCK_STEPS = ((q, q) for q in (COMMAND, RESULT, EVENT, LOCK_STEP))
+
 TOPICS = (
     Topic(
         names.MASTER_MEASURED,
@@ -88,8 +92,7 @@ TOPICS = (
         'on change and 10 Hz',
         '`buttons[0]` = 1: follow the handle, or go on with a motion that waits for it '
         "(`hold_to_play`); the master's own while it plays any other motion",
-        offered=EVENT,
-        asked=EVENT,
+        *_EVENTS,
         said_by=('master',),
         heard_by=('master', 'compensator'),
         one_sender=True,
@@ -100,8 +103,7 @@ TOPICS = (
         _STREAM,
         'desired bending: `position` in rad and `velocity` in rad/s of `bend_x` and `bend_y`, '
         "`header.frame_id` the motion session; the master's unless its source is `none`",
-        offered=COMMAND,
-        asked=COMMAND,
+        *_COMMANDS,
         said_by=('master',),
         heard_by=('compensator', 'controller'),
         one_sender=True,
@@ -111,8 +113,7 @@ TOPICS = (
         _JOINT_STATE,
         '40 Hz',
         'bending by the EM tracker: `position` in rad of `bend_x` and `bend_y`',
-        offered=SENSOR_OFFERED,
-        asked=SENSOR_ASKED,
+        *_SENSOR,
         said_by=('em_tracker',),
         heard_by=(
             'master',
@@ -130,8 +131,7 @@ TOPICS = (
         _STREAM,
         'command to the shafts after compensation: `position` in rad of `motor_x` and `motor_y`, '
         '`header.frame_id` the motion session',
-        offered=COMMAND,
-        asked=COMMAND,
+        *_COMMANDS,
         said_by=('compensator',),
         heard_by=('motor_driver',),
         one_sender=True,
@@ -142,8 +142,7 @@ TOPICS = (
         'on change, 1 kHz in motion, and 20 Hz',
         'what the motor driver made of all commands: `position` in rad to which the shafts '
         '`motor_x` and `motor_y` are sent from the stamp on',
-        offered=SENSOR_OFFERED,
-        asked=SENSOR_ASKED,
+        *_SENSOR,
         said_by=('motor_driver',),
         heard_by=('watch',),
         one_sender=True,
@@ -154,8 +153,7 @@ TOPICS = (
         '1 kHz simulated, as the bus carries on hardware',
         '`position` in rad, `velocity` in rad/s and `effort` in N m of the shafts `motor_x` and '
         '`motor_y`',
-        offered=SENSOR_OFFERED,
-        asked=SENSOR_ASKED,
+        *_SENSOR,
         said_by=('motor_driver',),
         heard_by=(
             *('master', 'compensator', 'controller', 'calibration', 'supervisor', 'watch'),
@@ -168,8 +166,7 @@ TOPICS = (
         _JOINT_STATE,
         '1 kHz simulated, as the transmitter is read on hardware',
         '`effort`: tension in N of `wire_x_pos`, `wire_x_neg`, `wire_y_pos` and `wire_y_neg`',
-        offered=SENSOR_OFFERED,
-        asked=SENSOR_ASKED,
+        *_SENSOR,
         said_by=('load_cells',),
         heard_by=('calibration', 'supervisor', 'watch'),
         one_sender=True,
@@ -179,8 +176,7 @@ TOPICS = (
         'geometry_msgs/msg/PoseStamped',
         '40 Hz',
         "pose of the tip in the frame of the instrument's base: m, and a quaternion",
-        offered=SENSOR_OFFERED,
-        asked=SENSOR_ASKED,
+        *_SENSOR,
         said_by=('em_tracker',),
     ),
     Topic(
@@ -189,8 +185,7 @@ TOPICS = (
         '1 kHz while it calibrates or goes home',
         '`position` in rad and `velocity` in rad/s of the shafts, divided by the gear; goes before '
         'the master and passes uncompensated',
-        offered=COMMAND,
-        asked=COMMAND,
+        *_COMMANDS,
         said_by=('calibration',),
         heard_by=('master', 'compensator', 'controller'),
         recorded=False,
@@ -213,8 +208,7 @@ TOPICS = (
         'After an abort the level is ERROR, with `reason` and `step`; for tensions '
         'that neither explains it is ERROR, with `reason` and `class_deg` `none`, and '
         'nothing is compensated',
-        offered=RESULT,
-        asked=RESULT,
+        *_RESULTS,
         said_by=('calibration',),
         heard_by=('master', 'compensator', 'controller'),
         one_sender=True,
@@ -230,8 +224,7 @@ TOPICS = (
         'and `code` says why it was aborted or rejected: `busy`, `beyond_reach`, `no_session`, '
         '`session_ended`, `tension_ceiling`, `stream_silent`, `tension_gap`, `unknown_tube`, '
         '`not_judged` or `not_reached`; the message is the same in words',
-        offered=RESULT,
-        asked=RESULT,
+        *_RESULTS,
         said_by=('calibration',),
     ),
     Topic(
@@ -240,8 +233,7 @@ TOPICS = (
         'once a calibration, latched',
         f'the figures of `{names.CALIBRATION_RESULT}` as numbers, for programs that plot: `name` '
         'is the key, `position` the value in SI; `class` in rad, `success` 1 or 0',
-        offered=RESULT,
-        asked=RESULT,
+        *_RESULTS,
         said_by=('calibration',),
     ),
     Topic(
@@ -250,8 +242,7 @@ TOPICS = (
         '1 kHz while commands come',
         'correction by feedback: `position` in rad of `bend_x` and `bend_y`, added to the command '
         'of the shafts divided by the gear',
-        offered=COMMAND,
-        asked=COMMAND,
+        *_COMMANDS,
         said_by=('controller',),
         heard_by=('compensator',),
         recorded=False,
@@ -263,8 +254,7 @@ TOPICS = (
         _LATCHED_STATE,
         'status `compensator: model`: `mode` in force, `wanted_mode`, `selected_by`, `class_deg`, '
         "`lead` in s, `gear`, and the mode's parameters of each joint as `bend_x.…`",
-        offered=RESULT,
-        asked=RESULT,
+        *_RESULTS,
         said_by=('compensator',),
         one_sender=True,
     ),
@@ -280,8 +270,7 @@ TOPICS = (
         'and `code`: `not_a_plant`, `other_joints`, `not_invertible`, `beyond_range`, `moving`, '
         '`busy`, `not_measured`, `no_session`, `other_session`, `other_sender`, '
         '`nothing_to_undo` or `withdrawn`; the message is the same in words',
-        offered=RESULT,
-        asked=RESULT,
+        *_RESULTS,
         said_by=('compensator',),
         heard_by=('master', 'watch'),
         one_sender=True,
@@ -292,8 +281,7 @@ TOPICS = (
         'when somebody asks',
         'status `adopt`: `id` of the request and the file as `plant`, empty for the plant before; '
         '`header.frame_id` names the motion session',
-        offered=EVENT,
-        asked=EVENT,
+        *_EVENTS,
         heard_by=('compensator',),
     ),
     Topic(
@@ -301,8 +289,7 @@ TOPICS = (
         'std_msgs/msg/String',
         'on change and 20 Hz, latched',
         '`DISABLED`, `ENABLED`, `PAUSED` or `FAULT`',
-        offered=RESULT,
-        asked=RESULT,
+        *_RESULTS,
         said_by=('supervisor',),
         heard_by=('motor_driver',),
         one_sender=True,
@@ -312,8 +299,7 @@ TOPICS = (
         'std_msgs/msg/Header',
         'on change and 20 Hz',
         '`frame_id` names the motion session that the last `enable` opened; empty for none',
-        offered=EVENT,
-        asked=EVENT,
+        *_EVENTS,
         said_by=('supervisor',),
         heard_by=('master', 'compensator', 'controller', 'calibration', 'motor_driver'),
         one_sender=True,
@@ -333,8 +319,7 @@ TOPICS = (
         'when somebody asks at a page',
         'what was asked for at a page of `endoscope console`, and what became of it: status '
         '`console_web: order` with `operator`, `address`, `order`, `answer` and `why`',
-        offered=EVENT,
-        asked=EVENT,
+        *_EVENTS,
     ),
     Topic(
         names.RECORDER_MARK,
@@ -342,8 +327,7 @@ TOPICS = (
         'when somebody asks',
         'an operator, or the watch, marks this moment, in words or with an empty text: the '
         'recorder writes what came before and the 2 s after as a bag',
-        offered=EVENT,
-        asked=EVENT,
+        *_EVENTS,
         said_by=('watch',),
         heard_by=('recorder',),
     ),
@@ -352,8 +336,7 @@ TOPICS = (
         _JOINT_STATE,
         _STREAM,
         'what the simulated slave shows its simulated load cells, without noise: `effort` in N',
-        offered=LOCK_STEP,
-        asked=LOCK_STEP,
+        *_LOCK_STEPS,
         said_by=('motor_driver',),
         heard_by=('load_cells',),
         recorded=False,
@@ -363,8 +346,7 @@ TOPICS = (
         _JOINT_STATE,
         _STREAM,
         'what the simulated slave shows its simulated tracker, without noise: `position` in rad',
-        offered=LOCK_STEP,
-        asked=LOCK_STEP,
+        *_LOCK_STEPS,
         said_by=('motor_driver',),
         heard_by=('em_tracker',),
         recorded=False,
@@ -376,8 +358,7 @@ TOPICS = (
         'what the rig is, as YAML: `kind` `simulated`, `emulated` (servos that this project '
         'emulates) or `real`, `program` and its version, `rig_sha256` of its `rig.yaml`, and of a '
         'simulated one `plant` and `plant_sha256`; every recording has it',
-        offered=RESULT,
-        asked=RESULT,
+        *_RESULTS,
         said_by=('motor_driver',),
     ),
     Topic(
@@ -386,8 +367,7 @@ TOPICS = (
         'once, latched',
         'the instrument as URDF for programs that draw robots: insertion tube, bending section as '
         'a chain of vertebrae, tip and wires, of cylinders and spheres alone',
-        offered=RESULT,
-        asked=RESULT,
+        *_RESULTS,
         said_by=('instrument_model',),
     ),
     Topic(
@@ -395,8 +375,7 @@ TOPICS = (
         'std_msgs/msg/String',
         'once, latched',
         'the same where viewers look for it first',
-        offered=RESULT,
-        asked=RESULT,
+        *_RESULTS,
         said_by=('instrument_model',),
     ),
     Topic(
@@ -405,8 +384,7 @@ TOPICS = (
         '20 Hz',
         'the measured bending as `position` in rad of every joint of `robot_description`, '
         '`vertebra_01_x` and so on',
-        offered=SENSOR_OFFERED,
-        asked=SENSOR_ASKED,
+        *_SENSOR,
         said_by=('instrument_model',),
     ),
     Topic(
@@ -423,8 +401,7 @@ TOPICS = (
         _DIAGNOSTICS,
         '1 Hz, and at once when a node is in trouble',
         'health of every node, as `/endoscope/NODE: subcomponent`',
-        offered=EVENT,
-        asked=EVENT,
+        *_EVENTS,
         said_by=('every node',),
         heard_by=('supervisor',),
     ),

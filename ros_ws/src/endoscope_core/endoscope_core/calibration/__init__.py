@@ -1,7 +1,6 @@
 """The procedure by which the tube's hysteresis class is found."""
 
 from endoscope_core.calibration.calibration_run import (
-    CalibrationCommand,
     CalibrationRun,
     CalibrationStep,
 )
@@ -15,7 +14,6 @@ from endoscope_core.calibration.records import (
 
 __all__ = [
     'BendingRecord',
-    'CalibrationCommand',
     'CalibrationRun',
     'CalibrationStep',
     'TensionGapError',

@@ -7,7 +7,7 @@ from statistics import NormalDist
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike
+from numpy.typing import ArrayLike
 
 from endoscope_core.errors import EndoscopeError
 
@@ -69,11 +69,9 @@ class Classifier(Protocol):
         ...
 
 
-def checked_tension(
-    tension: ArrayLike, shape: tuple[int, int], dtype: DTypeLike = np.float64
-) -> np.ndarray:
+def checked_tension(tension: ArrayLike, shape: tuple[int, int]) -> np.ndarray:
     """Tensions as an array; ClassifierError where the shape is another or a value not finite."""
-    array: np.ndarray = np.asarray(tension, dtype=dtype)
+    array: np.ndarray = np.asarray(tension, dtype=np.float64)
     if array.shape != shape:
         raise ClassifierError(f'tensions of a calibration have shape {shape}, not {array.shape}')
     if not np.all(np.isfinite(array)):

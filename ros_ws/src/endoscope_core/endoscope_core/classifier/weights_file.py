@@ -15,7 +15,6 @@ from msgspec import Meta
 from numpy.typing import DTypeLike
 from safetensors import SafetensorError
 
-from endoscope_core.atomic_output import write_bytes, write_text
 from endoscope_core.classifier.classification import WIRES, ClassifierError
 from endoscope_core.classifier.cnn_classifier import (
     CnnClassifier,
@@ -23,7 +22,6 @@ from endoscope_core.classifier.cnn_classifier import (
     cnn_shapes,
     course,
 )
-from endoscope_core.errors import FileError
 from endoscope_core.schema import read, within
 from endoscope_core.signals import SINUSOID, calibration_motion
 
@@ -32,25 +30,6 @@ SEAL = 'sha256'
 LARGEST_WEIGHTS, LARGEST_DESCRIPTION = 16 << 20, 1 << 20
 """In bytes. The largest that come with this package have 218 kB and 3 kB."""
 _Positive = Annotated[float, Meta(gt=0.0, le=sys.float_info.max, description='a positive number')]
-
-
-def weights_path(path: str | Path) -> Path:
-    """Check a weights file's name before long work: not a folder, nor .json like its twin."""
-    path = Path(path)
-    if path.suffix == '.json' or path.is_dir():
-        raise FileError(f'{path} cannot hold weights: name a file with suffix .safetensors')
-    return path
-
-
-def save_weights(
-    path: str | Path, state: Mapping[str, np.ndarray], description: Mapping[str, Any]
-) -> None:
-    """Write arrays to ``path`` and a description to the JSON file of the same name beside it."""
-    path = weights_path(path)
-    described = {'schema': SCHEMA, 'kind': 'cnn', **description}
-    data = safetensors.numpy.save({k: np.asarray(x, order='C') for k, x in state.items()})
-    write_bytes(path, data)
-    write_text(path.with_suffix('.json'), json.dumps(sealed(described, data), indent=1) + '\n')
 
 
 def read_weights(path: str | Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:

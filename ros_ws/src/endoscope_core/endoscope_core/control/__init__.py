@@ -1,6 +1,6 @@
 """From a hand to a command: what is desired, feed-forward and feedback."""
 
-from endoscope_core.choices import ADAPTIVE_PHYSICAL, MODES, PHYSICAL
+from endoscope_core.choices import ADAPTIVE_PHYSICAL, MODES
 from endoscope_core.control.adaptive_backlash import (
     AdaptiveBacklashSettings,
 )
@@ -15,17 +15,15 @@ from endoscope_core.control.feedforward import Feedforward, FeedforwardLaw, Feed
 from endoscope_core.control.handle import Handle, HandleRefusal, HandleSettings
 from endoscope_core.control.internal_model import PhysicalParameters, bending_range
 from endoscope_core.control.limits import MotorLimits
-from endoscope_core.control.physical_inverse import AdaptivePhysicalInverse, PhysicalInverse
-from endoscope_core.control.plant_learning import PlantLearning, PlantLearningSettings
+from endoscope_core.control.physical_inverse import PhysicalInverse
+from endoscope_core.control.plant_learning import PlantLearning
 from endoscope_core.control.tracker_feedback import AdaptiveBacklashController, TrackerMeasurement
 
 __all__ = [
     'ADAPTIVE_PHYSICAL',
     'MODES',
-    'PHYSICAL',
     'AdaptiveBacklashController',
     'AdaptiveBacklashSettings',
-    'AdaptivePhysicalInverse',
     'AdoptedPlant',
     'AdoptionError',
     'DesiredMotion',
@@ -39,7 +37,6 @@ __all__ = [
     'PhysicalInverse',
     'PhysicalParameters',
     'PlantLearning',
-    'PlantLearningSettings',
     'TrackerMeasurement',
     'adopted_plant',
     'bending_range',

@@ -2,6 +2,6 @@
 
 from endoscope_core.hysteresis.bouc_wen import BoucWenParameters
 from endoscope_core.hysteresis.dahl import DahlParameters
-from endoscope_core.hysteresis.memory_model import MemoryModel, direct_inverse, forward
+from endoscope_core.hysteresis.memory_model import direct_inverse, forward
 
-__all__ = ['BoucWenParameters', 'DahlParameters', 'MemoryModel', 'direct_inverse', 'forward']
+__all__ = ['BoucWenParameters', 'DahlParameters', 'direct_inverse', 'forward']

@@ -11,7 +11,6 @@ from endoscope_core.kinematics.constant_curvature import (
 from endoscope_core.kinematics.robot_description import robot_description
 from endoscope_core.kinematics.straight_registration import (
     RegistrationError,
-    StillnessLimits,
     StraightRegistration,
     register_straight,
 )
@@ -19,7 +18,6 @@ from endoscope_core.kinematics.straight_registration import (
 __all__ = [
     'Hinge',
     'RegistrationError',
-    'StillnessLimits',
     'StraightRegistration',
     'Transform',
     'Vertebrae',

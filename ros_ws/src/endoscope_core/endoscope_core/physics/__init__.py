@@ -9,7 +9,7 @@ from endoscope_core.physics.description import (
 )
 from endoscope_core.physics.packing import recording_faults
 from endoscope_core.physics.plant_file import load_plant, save_plant
-from endoscope_core.physics.sensing import RecordingFaults, SensorModel
+from endoscope_core.physics.sensing import SensorModel
 from endoscope_core.physics.simulator import (
     PlantSample,
     PlantSimulator,
@@ -24,7 +24,6 @@ __all__ = [
     'PlantSample',
     'PlantSimulator',
     'PlantTrajectory',
-    'RecordingFaults',
     'SensorModel',
     'SensorParameters',
     'TermSpec',

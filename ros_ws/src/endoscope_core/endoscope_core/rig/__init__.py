@@ -1,6 +1,5 @@
 """What stands on the table: gears, limits, time-outs and devices, said once for every node."""
 
-from endoscope_core.choices import LOAD_CELL_DEVICES, MOTOR_DEVICES, TRACKER_DEVICES
 from endoscope_core.rig.facts import (
     DeviceFacts,
     HandleFacts,
@@ -18,9 +17,6 @@ from endoscope_core.rig.facts import (
 from endoscope_core.rig.kind import Kind, RigKind, digest, kind_from_text, kind_of_several
 
 __all__ = [
-    'LOAD_CELL_DEVICES',
-    'MOTOR_DEVICES',
-    'TRACKER_DEVICES',
     'DeviceFacts',
     'HandleFacts',
     'InstrumentFacts',

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 
 RELEASE = 0.9
+SAMPLES = 3
 TOLD_RAD = 0.02
 """13 counts of an encoder of 4096.  With the position gain that an XM430-W350 comes with (800, that
 is 6.25 of 885 steps of duty for a count) they are worth 9 % of its stall torque of 4.1 N m, or
@@ -15,16 +16,15 @@ PATIENCE_NS = 300_000_000
 class TensionGuard:
     """Says when one of W wires is pulled harder than `ceiling`, in N.
 
-    A wire is over the ceiling once `samples` readings in a row are: a single spike of a load cell
+    A wire is over the ceiling once `SAMPLES` readings in a row are: a single spike of a load cell
     is not a tension. A reading that is not a number counts as over the ceiling, for it hides one.
     That is over only after as many at nine tenths of the ceiling, for readings that scatter about
     the ceiling are still of a wire that is pulled too hard.
     """
 
-    def __init__(self, names: Sequence[str], ceiling: float, samples: int = 3) -> None:
+    def __init__(self, names: Sequence[str], ceiling: float) -> None:
         self._names = tuple(names)
         self._ceiling = ceiling
-        self._samples = samples
         self._run = [0] * len(self._names)
         self._clear = 0
         self.peak = 0.0
@@ -44,14 +44,14 @@ class TensionGuard:
             self._run[wire] += 1
             if math.isfinite(value):
                 self.peak = max(self.peak, value)
-            if self._run[wire] >= self._samples and not self.trouble:
+            if self._run[wire] >= SAMPLES and not self.trouble:
                 self.trouble = (
                     f'tension of {self._names[wire]} is {value:.1f} N, '
                     f'over the ceiling of {self._ceiling:.1f} N'
                 )
         if self.trouble:
             self._clear = self._clear + 1 if low and not high else 0
-            if self._clear >= self._samples:
+            if self._clear >= SAMPLES:
                 self.trouble = ''
                 self._clear = 0
         return self.trouble

@@ -24,16 +24,14 @@ class MotionSession:
 
     Every method takes the node's steady time in ns. The node calls :meth:`hear` at each heartbeat
     of the supervisor and :meth:`beat` at each turn of its own loop, and asks `name` before it moves
-    anything. A supervisor that is silent for `silence_ns` ends the session, and so does a loop that
-    did not turn for `stall_ns`.
+    anything. A supervisor that is silent for `SILENCE_NS` ends the session, and so does a loop that
+    did not turn for `STALL_NS`.
     """
 
-    def __init__(self, silence_ns: int = SILENCE_NS, stall_ns: int = STALL_NS) -> None:
+    def __init__(self) -> None:
         self.name = ''  # session that the node takes part in; empty: it must not move anything
         # Why the node takes no part in the open session; empty where it does or none is open.
         self.trouble = ''
-        self._silence_ns = silence_ns
-        self._stall_ns = stall_ns
         # None until the first heartbeat and after one in doubt: a session that is open by then was
         # not opened before our ears.
         self._open: str | None = None
@@ -71,14 +69,14 @@ class MotionSession:
         if not self.name or before is None:
             return
         turn = now_ns - before
-        if turn > self._stall_ns:
+        if turn > STALL_NS:
             self.leave(f'stood still for {turn * 1e-6:.0f} ms')
             return
         if turn > _USUAL_TURN_NS:
             unheard = min(turn - _USUAL_TURN_NS, self._lenience_ns)
             self._lenience_ns -= unheard
             self._heard_ns += unheard
-        if now_ns - self._heard_ns > self._silence_ns:
+        if now_ns - self._heard_ns > SILENCE_NS:
             self.leave(f'the supervisor was silent for {(now_ns - self._heard_ns) * 1e-6:.0f} ms')
 
     def leave(self, reason: str) -> None:

@@ -2,12 +2,10 @@
 
 from endoscope_core.choices import BRIEF, CALIBRATION_MOTIONS, SINUSOID
 from endoscope_core.signals.calibration_motion import (
-    CALIBRATION_AMPLITUDE,
     CALIBRATION_RATE,
     CALIBRATION_RECORD_DURATION,
     CALIBRATION_SAMPLES,
     CalibrationMotion,
-    brief_calibration,
     calibration_motion,
     calibration_sinusoid,
 )
@@ -20,11 +18,10 @@ from endoscope_core.signals.motions import (
     periodic_signal,
     sum_of_sines,
 )
-from endoscope_core.signals.signal import Motion, Signal, come_to_rest, hold, move, sequence
+from endoscope_core.signals.signal import Motion, Signal, hold, move, sequence
 
 __all__ = [
     'BRIEF',
-    'CALIBRATION_AMPLITUDE',
     'CALIBRATION_MOTIONS',
     'CALIBRATION_RATE',
     'CALIBRATION_RECORD_DURATION',
@@ -35,10 +32,8 @@ __all__ = [
     'Motion',
     'Signal',
     'both_joints',
-    'brief_calibration',
     'calibration_motion',
     'calibration_sinusoid',
-    'come_to_rest',
     'commissioning_motion',
     'hold',
     'motion_by_name',

@@ -15,27 +15,23 @@ RAMP_DURATION = 1.0
 CORNER = 0.1
 
 
-def sum_of_sines(
-    name: str,
-    components: Sequence[tuple[float, float]],
-    duration: float,
-    ramp: float = RAMP_DURATION,
-) -> Signal:
+def sum_of_sines(name: str, components: Sequence[tuple[float, float]], duration: float) -> Signal:
     """Sum of sines, of amplitude (rad) and frequency (rad/s) each, begun and ended by ramps.
 
-    `duration` in s includes both ramps of `ramp` s. The `steady` interval leaves out the ramps and
+    `duration` in s includes both ramps. The `steady` interval leaves out the ramps and
     the first quarter period of the slowest sine, after which the hysteresis no longer remembers how
     the motion began; ValueError if that leaves none.
     """
     quarter = 0.5 * np.pi / min(omega for _, omega in components)
-    steady = (max(ramp, quarter), duration - ramp)
+    steady = (max(RAMP_DURATION, quarter), duration - RAMP_DURATION)
     if steady[1] <= steady[0]:
         raise ValueError(
-            f'{name}: {duration:g} s are too short, give more than {steady[0] + ramp:.3g} s'
+            f'{name}: {duration:g} s are too short, '
+            f'give more than {steady[0] + RAMP_DURATION:.3g} s'
         )
 
     def evaluate(time: FloatArray) -> tuple[FloatArray, FloatArray]:
-        gain, rate = window(time, duration, ramp, ramp)
+        gain, rate = window(time, duration, RAMP_DURATION, RAMP_DURATION)
         sine = sum((a * np.sin(w * time) for a, w in components), np.zeros_like(time))
         cosine = sum((a * w * np.cos(w * time) for a, w in components), np.zeros_like(time))
         return gain * sine, gain * cosine + rate * sine
@@ -129,13 +125,13 @@ def chirp(amplitude: float, duration: float, start: float = 0.2, stop: float = 4
     return Signal('chirp', duration, evaluate, (0.5, duration - 0.5))
 
 
-def teleoperation_like(seed: int, reaches: int, reach: float, end: float = 0.0) -> Signal:
+def teleoperation_like(seed: int, reaches: int, reach: float) -> Signal:
     """Minimum-jerk reaches to random angles within +-`reach` rad with pauses, like a hand's."""
     generator = np.random.default_rng(seed)
     parts: list[Signal] = []
     here = 0.0
     for k in range(reaches):
-        target = end if k == reaches - 1 else float(generator.uniform(-reach, reach))
+        target = 0.0 if k == reaches - 1 else float(generator.uniform(-reach, reach))
         parts += [
             move(here, target, float(generator.uniform(0.5, 1.1))),
             hold(float(generator.uniform(0.05, 0.4)), target),

@@ -224,6 +224,6 @@ def bytes_of_cycle(servos: int) -> int:
     return len(requests) + servos * (STATUS_OVERHEAD + BLOCK_SIZE)
 
 
-def cycles_per_second(baud: int, servos: int, return_delay: float = 0.0) -> float:
-    """Largest rate that the line carries at `baud` bit/s, with `return_delay` s of each servo."""
-    return 1.0 / (bytes_of_cycle(servos) * byte_time(baud) + servos * return_delay)
+def cycles_per_second(baud: int, servos: int) -> float:
+    """Largest rate that the line carries at `baud` bit/s."""
+    return 1.0 / (bytes_of_cycle(servos) * byte_time(baud))

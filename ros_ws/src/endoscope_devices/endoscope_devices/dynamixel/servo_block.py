@@ -43,6 +43,9 @@ class Freshness(Enum):
     AHEAD = 'from a clock that jumped'
 
 
+_DRIFT = 0.01  # rate error of the clocks at most; one without a crystal keeps 1 %
+
+
 class TickClock:
     """Keeps the offset between a servo's clock and ours as an interval, and judges ticks by it.
 
@@ -53,8 +56,7 @@ class TickClock:
     above them, and that of a counter that began anew lies anywhere.
     """
 
-    def __init__(self, drift: float = 0.01) -> None:
-        self._drift = drift  # rate error of the clocks at most; one without a crystal keeps 1 %
+    def __init__(self) -> None:
         self._low_ns = 0
         self._high_ns = 0
         self._tick = -1
@@ -71,7 +73,7 @@ class TickClock:
             self._low_ns = asked_ns - (tick + 1) * _MS
             self._high_ns = received_ns - tick * _MS
             return Freshness.NEW
-        slack = int((received_ns - self._seen_ns) * self._drift) + _MS // 5
+        slack = int((received_ns - self._seen_ns) * _DRIFT) + _MS // 5
         turns = round((received_ns - self._high_ns - tick * _MS) / (TICK_PERIOD * _MS))
         elapsed_ns = (tick + turns * TICK_PERIOD) * _MS
         low = max(self._low_ns - slack, asked_ns - elapsed_ns - _MS)

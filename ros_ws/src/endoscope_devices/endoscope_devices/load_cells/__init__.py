@@ -1,11 +1,9 @@
 """Wire tensions from load cells behind a Modbus transmitter."""
 
-from endoscope_devices.load_cells.calibration_file import LoadCellCalibration, load_calibration
+from endoscope_devices.load_cells.calibration_file import load_calibration
 from endoscope_devices.load_cells.modbus_load_cells import (
     CONNECTIONS,
     LoadCellDevice,
-    ModbusLoadCells,
-    WireReading,
     modbus_rtu,
     modbus_tcp,
 )
@@ -18,11 +16,8 @@ from endoscope_devices.load_cells.tare import (
 
 __all__ = [
     'CONNECTIONS',
-    'LoadCellCalibration',
     'LoadCellDevice',
-    'ModbusLoadCells',
     'TareError',
-    'WireReading',
     'apply_saved_tare',
     'load_calibration',
     'modbus_rtu',

@@ -13,6 +13,7 @@ from endoscope_devices.load_cells.calibration_file import SerialSettings
 # A Modbus frame has at most 260 bytes (Modbus Messaging on TCP/IP V1.0b, section 3.1.3).
 LONGEST = 260
 MODBUS_TCP_PORT = 502
+_CONNECTS_S = 1.0
 # Start, eight of data, parity or a second stop bit, stop.
 _BITS = 11
 
@@ -122,24 +123,23 @@ class SerialLine(Line):
 
 
 class TcpLine(Line):
-    """A TCP connection to ``HOST`` or ``HOST:PORT``, by default port 502; `timeout` s to connect.
+    """A TCP connection to ``HOST`` or ``HOST:PORT``, by default port 502.
 
     DeviceError where the address cannot be understood.
     """
 
-    def __init__(self, address: str, timeout: float = 1.0) -> None:
+    def __init__(self, address: str) -> None:
         host, _, port = address.partition(':')
         if not host or (port and not port.isdecimal()) or int(port or 1) not in range(1, 65536):
             raise DeviceError(f"'{address}' is not an address: give HOST or HOST:PORT")
         self._address = (host, int(port) if port else MODBUS_TCP_PORT)
         super().__init__(f'{self._address[0]}:{self._address[1]}')
-        self._timeout = timeout
         self._socket: socket.socket | None = None
 
     def open(self) -> None:
         """See :class:`Line`."""
         try:
-            self._socket = socket.create_connection(self._address, self._timeout)
+            self._socket = socket.create_connection(self._address, _CONNECTS_S)
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         except OSError as error:
             raise LineLostError(

@@ -27,6 +27,7 @@ from endoscope_devices.dynamixel.packet import (
     encode,
 )
 from endoscope_devices.dynamixel.serial_port import byte_time
+from endoscope_emulators.dynamixel.control_table import BAUD_RATE, ID
 from endoscope_emulators.dynamixel.faults import LineFaults
 from endoscope_emulators.dynamixel.servo import EmulatedServo, ErrorNumber
 
@@ -46,7 +47,7 @@ class EmulatedBus(ClosedOnExit):
     """
 
     def __init__(self, servos: Sequence[EmulatedServo], link: Path | None = None) -> None:
-        self.servos = {servo.value(table.ID): servo for servo in servos}
+        self.servos = {servo.value(ID): servo for servo in servos}
         self.faults = LineFaults()  # in force; change them inside :meth:`paused`
         self._link = link
         self._lock = threading.RLock()
@@ -205,10 +206,10 @@ class EmulatedBus(ClosedOnExit):
             for device, servo in self.servos.items()
             if device not in self.faults.silent
             and servo.answers(now)
-            and BAUD_CODES[servo.value(table.BAUD_RATE)] == speed
+            and BAUD_CODES[servo.value(BAUD_RATE)] == speed
         ]
         for servo in hearing:
-            if packet.device in (BROADCAST_ID, servo.value(table.ID)):
+            if packet.device in (BROADCAST_ID, servo.value(ID)):
                 servo.hear(now)
         line = max(now, self._line_free)
         for servo, answer in self._answers(packet, hearing, now):
@@ -228,14 +229,14 @@ class EmulatedBus(ClosedOnExit):
             size = int.from_bytes(words[2:4], 'little')
             for start in range(4, len(words), 1 + size):
                 for servo in hearing:
-                    if servo.value(table.ID) == words[start]:
+                    if servo.value(ID) == words[start]:
                         servo.write(
                             int.from_bytes(words[:2], 'little'),
                             words[start + 1 : start + 1 + size],
                         )
         else:
-            for servo in sorted(hearing, key=lambda one: one.value(table.ID)):
-                device = servo.value(table.ID)
+            for servo in sorted(hearing, key=lambda one: one.value(ID)):
+                device = servo.value(ID)
                 if packet.device == device:
                     level = servo.value(table.STATUS_RETURN_LEVEL)
                     error, data = self._single(packet, servo, now)
@@ -269,7 +270,7 @@ class EmulatedBus(ClosedOnExit):
     ) -> Iterator[tuple[EmulatedServo, bytes]]:
         words = packet.parameters
         address, size = (int.from_bytes(words[k : k + 2], 'little') for k in (0, 2))
-        here = {servo.value(table.ID): servo for servo in hearing}
+        here = {servo.value(ID): servo for servo in hearing}
         for device in words[4:]:
             if device not in here:
                 # Each servo answers after the one before it in the list.
@@ -284,4 +285,4 @@ _ALWAYS_ANSWERED = (Instruction.PING, Instruction.READ)
 
 def _status(servo: EmulatedServo, error: ErrorNumber, data: bytes) -> bytes:
     head = bytes((error | servo.alert(),))
-    return encode(servo.value(table.ID), STATUS, head + data)
+    return encode(servo.value(ID), STATUS, head + data)

@@ -9,20 +9,32 @@ from enum import IntEnum
 
 from endoscope_devices.dynamixel import control_table as table
 from endoscope_devices.dynamixel.control_table import (
-    CONTROL_TABLE,
     COUNT,
     CURRENT_UNIT,
     INDIRECT_ADDRESS,
-    INDIRECT_ADDRESS_29,
-    INDIRECT_COUNT,
     INDIRECT_DATA,
-    INDIRECT_DATA_29,
-    TABLE_SIZE,
     TICK_PERIOD,
     VELOCITY_UNIT,
     WATCHDOG_TRIPPED,
     WATCHDOG_UNIT,
     Register,
+)
+from endoscope_emulators.dynamixel.control_table import (
+    BAUD_RATE,
+    CONTROL_TABLE,
+    GOAL_PWM,
+    GOAL_VELOCITY,
+    ID,
+    INDIRECT_ADDRESS_29,
+    INDIRECT_COUNT,
+    INDIRECT_DATA_29,
+    MAX_POSITION_LIMIT,
+    MIN_POSITION_LIMIT,
+    MIN_VOLTAGE_LIMIT,
+    MOVING,
+    PRESENT_POSITION,
+    PRESENT_VELOCITY,
+    TABLE_SIZE,
 )
 from endoscope_emulators.dynamixel.shaft import FirstOrderShaft
 
@@ -35,9 +47,9 @@ _POSITION_MODE = 3
 _TRACE_LENGTH = 60_000
 
 _GOALS = {
-    table.GOAL_PWM,
+    GOAL_PWM,
     table.GOAL_CURRENT,
-    table.GOAL_VELOCITY,
+    GOAL_VELOCITY,
     table.PROFILE_ACCELERATION,
     table.PROFILE_VELOCITY,
     table.GOAL_POSITION,
@@ -91,8 +103,8 @@ class EmulatedServo:
                 self._store(register, register.initial)
         self._store(table.MODEL_NUMBER, model)
         self._store(table.MODEL_INFORMATION, information)
-        self._store(table.ID, device)
-        self._store(table.BAUD_RATE, baud_code)
+        self._store(ID, device)
+        self._store(BAUD_RATE, baud_code)
         self._now = self._begin = 0.0
         self._steps = 0
         self._born = 0.0
@@ -201,9 +213,7 @@ class EmulatedServo:
         if (
             register is table.GOAL_POSITION
             and self.value(table.OPERATING_MODE) == _POSITION_MODE
-            and not self.value(table.MIN_POSITION_LIMIT)
-            <= counts
-            <= self.value(table.MAX_POSITION_LIMIT)
+            and not self.value(MIN_POSITION_LIMIT) <= counts <= self.value(MAX_POSITION_LIMIT)
         ):
             return ErrorNumber.DATA_LIMIT
         if register is table.TORQUE_ENABLE and counts and self._shut_down():
@@ -244,7 +254,7 @@ class EmulatedServo:
         self._reset_goals()
 
     def _reset_goals(self) -> None:
-        self._store(table.GOAL_POSITION, self.value(table.PRESENT_POSITION))
+        self._store(table.GOAL_POSITION, self.value(PRESENT_POSITION))
         self._store(table.GOAL_CURRENT, self.value(table.CURRENT_LIMIT))
 
     def _step(self) -> None:
@@ -265,7 +275,7 @@ class EmulatedServo:
         self._store(table.PRESENT_CURRENT, round(current / CURRENT_UNIT))
         self._show()
         self._watch_load(torque, abs(current) >= 0.999 * limit * CURRENT_UNIT > 0.0)
-        if self.supply < self.value(table.MIN_VOLTAGE_LIMIT) * 0.1:
+        if self.supply < self.value(MIN_VOLTAGE_LIMIT) * 0.1:
             self._detect(_VOLTAGE_BIT)
 
     def _watch_bus(self, torque: bool) -> None:
@@ -273,7 +283,7 @@ class EmulatedServo:
         watchdog = self.value(table.BUS_WATCHDOG)
         if torque and watchdog > 0 and self._now - self._heard > watchdog * WATCHDOG_UNIT:
             self._store(table.BUS_WATCHDOG, WATCHDOG_TRIPPED)
-            self._store(table.GOAL_POSITION, self.value(table.PRESENT_POSITION))
+            self._store(table.GOAL_POSITION, self.value(PRESENT_POSITION))
 
     def _watch_load(self, torque: bool, saturated: bool) -> None:
         self._saturated_s = self._saturated_s + STEP_S if torque and saturated else 0.0
@@ -281,12 +291,12 @@ class EmulatedServo:
             self._detect(_OVERLOAD_BIT)
 
     def _show(self) -> None:
-        self._store(table.PRESENT_POSITION, round(self.shaft.position / COUNT))
-        self._store(table.PRESENT_VELOCITY, round(self.shaft.velocity / VELOCITY_UNIT))
+        self._store(PRESENT_POSITION, round(self.shaft.position / COUNT))
+        self._store(PRESENT_VELOCITY, round(self.shaft.velocity / VELOCITY_UNIT))
         self._store(table.PRESENT_INPUT_VOLTAGE, round(self.supply * 10.0))
         tick = math.floor((self._now - self._born) * 1e3 + 1e-6)
         self._store(table.REALTIME_TICK, max(0, tick) % TICK_PERIOD)
-        self._store(table.MOVING, int(abs(self.shaft.velocity) > 10 * VELOCITY_UNIT))
+        self._store(MOVING, int(abs(self.shaft.velocity) > 10 * VELOCITY_UNIT))
 
     def _store(self, register: Register, counts: int) -> None:
         end = register.address + register.size

@@ -17,7 +17,7 @@ from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.on_stamps import hold_on_ticks
 from endoscope_core.physics.simulator import LARGEST_COMMAND, TICK, simulate
 from endoscope_explain.audit.criteria import DERIVED
-from endoscope_explain.audit.misfit import LONGEST_S, PERIOD_S, Bounds, Criteria, Moments
+from endoscope_explain.audit.misfit import LONGEST_S, PERIOD_S, Bounds, Moments
 from endoscope_explain.audit.misreading import (
     CONVERTER_BITS,
     KINDS,
@@ -54,14 +54,9 @@ class Comparison:
     """A recording with ordered stamps beside what the described plant makes of its command."""
 
     def __init__(
-        self,
-        recording: Recording,
-        plant: PlantDescription,
-        leave_out: Collection[str] = (),
-        criteria: Criteria = DERIVED,
+        self, recording: Recording, plant: PlantDescription, leave_out: Collection[str] = ()
     ) -> None:
         self._plant, self._rig = plant, recording.rig
-        self._criteria = criteria
         begin, end = _span(recording)
         self.grid = np.arange(begin, end, PERIOD_S)
         self._held = hold_on_ticks(
@@ -94,8 +89,8 @@ class Comparison:
 
     def judged(self, worth: float | None = None) -> tuple[Misreading, ...]:
         """Find the mistakes that make the recording more likely than their price, if any."""
-        worth = self._criteria.worth if worth is None else worth
-        right, usual = self._right(), self._criteria.usual
+        worth = DERIVED.worth if worth is None else worth
+        right, usual = self._right(), DERIVED.usual
         as_read = self._beyond_reach(right, worth)
         as_read += sum(self._ways(right, q)[0].against(worth) for q in self.measured)
         at_best = sum(self.measured[q].shape[1] * log(usual[q]) for q in self.measured)
@@ -136,7 +131,7 @@ class Comparison:
     def unlike(self, mistakes: Collection[Misreading]) -> list[tuple[str, int]]:
         """Quantities and columns that must move and are nothing like the simulated ones."""
         # What they share is worth less than the scale that was fitted for it (Schwarz).
-        worth = self._criteria.worth
+        worth = DERIVED.worth
         least = exp(-0.5 * log(worth) / worth)
         drive = next((m for m in mistakes if m.quantity == 'command'), self._right())
         return [
@@ -165,7 +160,7 @@ class Comparison:
         if 'shaft_position' not in self.measured:
             return not drive.of_gear
         followed = self._ways(drive, 'shaft_position')
-        allowed = log(self._criteria.follows) * self._held.shape[1]
+        allowed = log(DERIVED.follows) * self._held.shape[1]
         return any(w.misfit <= allowed for w in followed if w.reading.kind in ('right', 'sign'))
 
     def _beyond_reach(self, drive: Misreading, worth: float) -> float:
@@ -175,7 +170,7 @@ class Comparison:
         """
         turned = np.abs(self._held[:, list(drive.source)] / np.asarray(drive.factor)).max(axis=0)
         columns = int((turned > self._rig.motors.reach).sum())
-        return columns * worth * log(MOST / self._criteria.usual['shaft_position'])
+        return columns * worth * log(MOST / DERIVED.usual['shaft_position'])
 
     def simulated(self, command: Misreading) -> dict[str, Array]:
         """Simulate the plant on the command as it is meant."""
@@ -221,14 +216,14 @@ class Comparison:
 
     def _ways_of(self, quantity: str, simulated: Array) -> list[Way]:
         moments = Moments.of(self.measured[quantity], simulated)
-        lowest, largest = self._criteria.scales[quantity]
-        usual = self._criteria.usual[quantity]
+        lowest, largest = DERIVED.scales[quantity]
+        usual = DERIVED.usual[quantity]
         bounds = Bounds(
             (lowest, largest),
             TURN_RAD if quantity == 'bending' else inf,
             self.noise[quantity],
             self._scatter[quantity],
-            self._criteria.least_tension if quantity == 'tension' else -inf,
+            DERIVED.least_tension if quantity == 'tension' else -inf,
         )
         misfits: dict[float, Array] = {}
         found = []
@@ -254,7 +249,7 @@ class Comparison:
         columns = len(size)
         whole = tuple(range(columns))
         parts = [whole] if quantity == 'tension' else [*((c,) for c in whole), whole]
-        ways = CONVERTER_BITS * log(2.0) / self._criteria.usual[quantity]
+        ways = CONVERTER_BITS * log(2.0) / DERIVED.usual[quantity]
         for part in dict.fromkeys(parts):
             factor = float(np.median(size[list(part)]))
             of_a_rig = quantity == 'tension' and 1.0 / OTHER_RIGS <= factor <= OTHER_RIGS

@@ -111,22 +111,19 @@ LEAST_NATS = 0.08
 SHIFTS = 99
 
 
-def regime_in_words(
-    excesses: Sequence[SignalExcess], states: Mapping[str, Mask], seed: int = 0
-) -> str:
+def regime_in_words(excesses: Sequence[SignalExcess], states: Mapping[str, Mask]) -> str:
     """Name the one or two states, of `conditions`, that hold most of the excess in least time."""
     if not states or not excesses:
         return 'throughout'
     energy = _energy_on_grid(excesses, len(next(iter(states.values()))))
     everywhere = np.ones(len(energy), bool)
     # How far a state concentrates the excess is the Kullback-Leibler divergence between its share
-    # of the excess and its share of the time; by chance is what shifts of the excess in time (drawn
-    # by the seed) reach.
-    first = _best(energy, states, everywhere, seed)
+    # of the excess and its share of the time; by chance is what shifts of the excess in time reach.
+    first = _best(energy, states, everywhere, 0)
     if first is None:
         return 'throughout'
     rest = {words: active for words, active in states.items() if words != first}
-    second = _best(energy, rest, states[first], seed + 1)
+    second = _best(energy, rest, states[first], 1)
     return first if second is None else f'{first}, {second}'
 
 

@@ -46,13 +46,13 @@ def excess_between(
     return sorted(found, key=lambda e: -e.total)
 
 
-def shares(excesses: Sequence[SignalExcess], least: float = 0.03) -> dict[str, float]:
-    """Share of the whole excess of each signal, largest first, those below `least` left out."""
+def shares(excesses: Sequence[SignalExcess]) -> dict[str, float]:
+    """Share of the whole excess of each signal, largest first, without the least ones."""
     total = sum(e.total for e in excesses)
     if total <= 0.0:
         return {}
     every = {e.view.signal: e.total / total for e in excesses}
-    return {signal: share for signal, share in every.items() if share >= least}
+    return {signal: share for signal, share in every.items() if share >= LEAST_SHARE}
 
 
 WINDOW_S = 0.25
@@ -60,6 +60,9 @@ JOIN_S = 0.5
 """Windows closer than this are one interval."""
 SIGMAS = 4.0
 FAINT = 0.03
+LEAST_SHARE = 0.03
+MOST_INTERVALS = 12
+_LONGEST_LAG = 50
 
 
 def windowed(excesses: Sequence[SignalExcess], end: float) -> tuple[Array, Array]:
@@ -78,10 +81,8 @@ def windowed(excesses: Sequence[SignalExcess], end: float) -> tuple[Array, Array
     return sums, np.sqrt(np.maximum(variance, 1e-12))
 
 
-def intervals(
-    excesses: Sequence[SignalExcess], end: float, most: int = 12
-) -> tuple[tuple[float, float], ...]:
-    """Where the excess stands out of the noise, in s and in order: the strongest `most`."""
+def intervals(excesses: Sequence[SignalExcess], end: float) -> tuple[tuple[float, float], ...]:
+    """Where the excess stands out of the noise, in s and in order: the strongest twelve."""
     sums, spread = windowed(excesses, end)
     found: list[list[float]] = []
     for w in _strong(sums, spread):
@@ -91,7 +92,7 @@ def intervals(
             found[-1][2] += sums[w]
         else:
             found.append([begin, finish, sums[w]])
-    strongest = sorted(found, key=lambda f: -f[2])[:most]
+    strongest = sorted(found, key=lambda f: -f[2])[:MOST_INTERVALS]
     return tuple((float(a), float(b)) for a, b, _ in sorted(strongest))
 
 
@@ -118,12 +119,12 @@ def _strong(sums: Array, spread: Array) -> NDArray[np.intp]:
     return np.flatnonzero((sums > SIGMAS * spread) & (sums > FAINT * np.quantile(sums, 0.95)))
 
 
-def _correlation_time(values: Array, longest: int = 50) -> float:
+def _correlation_time(values: Array) -> float:
     """Sum of the squared autocorrelation of a residual: samples that count as one."""
     centred = values - values.mean()
     power = float(centred @ centred)
     if power <= 0.0 or len(values) < 4:
         return 1.0
-    lags = range(1, min(longest, len(values) // 4))
+    lags = range(1, min(_LONGEST_LAG, len(values) // 4))
     squares = [(float(centred[k:] @ centred[:-k]) / power) ** 2 for k in lags]
     return 1.0 + 2.0 * float(np.sum(squares))
