@@ -36,10 +36,12 @@ class BrowsedConsole:
         Of the page.
     operator, viewer
         Tokens.
+    folder
+        Of recordings.
     """
 
     def __init__(self, folder) -> None:
-        self._folder = folder
+        self.folder = folder
         # What it leaves of a core is the browser's.
         self.graph = OperatedGraph(folder)
         self._goes_on = True
@@ -73,7 +75,7 @@ class BrowsedConsole:
         """Start the server, at the address that it had before."""
         self._process = self.graph.start(
             *('console', '--no-graph', '--port', str(self._port)),
-            *('--token-file', str(self._folder / 'tokens'), '--bags', str(self._folder)),
+            *('--token-file', str(self.folder / 'tokens'), '--bags', str(self.folder)),
         )
         told = ''
         for _ in range(2):

@@ -1,15 +1,18 @@
 """The rig is investigated from a page: motions are asked for, held by hand, a plant adopted."""
 
-import json
+import time
 import urllib.request
+from dataclasses import replace
 
+import numpy as np
 import pytest
-from console_rig import ConsoleRig, ready
+from console_rig import PATIENCE_S, ConsoleRig, ready
+from short_bags import write_short_bag
 
 from endoscope_bags import open_bag
-from endoscope_bags.event_bag import MARK, events_of
-from endoscope_bags.metadata import METADATA
 from endoscope_core.physics import PlantDescription, save_plant
+from endoscope_core.signals.command_file import write_command_file
+from endoscope_explain.investigation.log import COMMISSIONING, Round, Stop, begun
 from endoscope_nodes.names import SLAVE_COMMAND
 
 pytestmark = pytest.mark.engine
@@ -20,10 +23,25 @@ PLANT_NAME = 'described.yaml'
 @pytest.fixture(scope='module')
 def running(tmp_path_factory):
     folder = tmp_path_factory.mktemp('investigated')
-    (folder / 'bags').mkdir()
-    save_plant(PlantDescription(), folder / 'bags' / PLANT_NAME)
+    bags = folder / 'bags'
+    bags.mkdir()
+    save_plant(PlantDescription(), bags / PLANT_NAME)
+    interrupted(bags / 'interrupted', bags / PLANT_NAME)
     with ConsoleRig(folder) as rig:
         yield rig
+
+
+def interrupted(folder, plant):
+    """An investigation that was left once a rig as described had been commissioned."""
+    log = begun(folder, plant)
+    folder.mkdir()
+    write_short_bag(folder / 'bag_1', PlantDescription())
+    write_command_file(folder / 'motion_1.csv', np.array([0.0, 4.0]), 0.1 * np.eye(2))
+    motion = Round(
+        COMMISSIONING, 'bend_x and bend_y', '', 'motion_1.csv', 4.0, 50.0, 'bag_1', recorded=True
+    )
+    log = replace(log, rounds=(motion,))
+    log.ended(Stop.INTERRUPTED, 'It was interrupted.').write(folder)
 
 
 @pytest.fixture
@@ -54,7 +72,7 @@ def told(page, name):
 def question(rig, page, name):
     rig.until(lambda: told(page, name)['question'] or not told(page, name)['running'], 'a question')
     asked = told(page, name)['question']
-    assert asked, told(page, name)
+    assert asked, (told(page, name)['error'], told(page, name)['sentence'])
     return asked
 
 
@@ -65,7 +83,9 @@ def ended(rig, page, name):
 
 def holds(rig, page, until):
     """Hold on, anew where a busy machine let go, until something has come true."""
+    end = time.monotonic() + PATIENCE_S
     while not until():
+        assert time.monotonic() < end, page.state
         if page.dead_man == 'READY':
             page.does(pressed=True)
         elif page.dead_man == 'OPEN' and page.hand.pressed:
@@ -85,7 +105,7 @@ def plays(rig, page, name):
     holds(rig, page, lambda: rig.wanted)
 
 
-def test_without_consent_nothing_moves_and_it_is_continued_later(running, page):
+def test_without_consent_nothing_moves_and_stop_leaves_everything_as_it_was(running, page):
     rig = running
     name = begin(rig, page, plant=PLANT_NAME)
     asked = question(rig, page, name)
@@ -101,22 +121,16 @@ def test_without_consent_nothing_moves_and_it_is_continued_later(running, page):
     it = ended(rig, page, name)
     assert it['sentence'] == 'It was interrupted: the motion was not wanted.'
     assert (it['goes_on'], it['error']) == (True, None)
-    assert begin(rig, page, investigation=name) == name
-    question(rig, page, name)
-    assert page.order('stop', investigation=name)['ok']
-    assert ended(rig, page, name)['goes_on']
     assert rig.client.state == 'DISABLED'
     assert not rig.wanted
 
-
-def test_stop_pauses_what_is_played_and_leaves_everything_as_it_was(running, page):
-    rig = running
-    name = begin(rig, page, plant=PLANT_NAME)
+    assert begin(rig, page, investigation=name) == name
     plays(rig, page, name)
     for op, words in (('record', {'on': True}), ('set', {'scale': 0.5}), ('adopt', {})):
         assert page.order(op, **words)['why'] == 'a motion of an investigation is under way'
     assert page.order('stop', investigation=name)['ok']
     it = ended(rig, page, name)
+    assert it['goes_on']
     assert rig.client.state == 'PAUSED'
     assert it['sentence'] == 'It was interrupted: a person ended it.'
     page.does(pressed=False)
@@ -135,24 +149,20 @@ def test_who_loses_the_controls_loses_what_is_played(running, page):
     rig.until(lambda: 'console_web' not in rig.handle_senders(), 'a free place of the handle')
 
 
-def test_one_is_played_explained_and_its_plant_adopted_and_undone(running, page):
+def test_one_is_explained_its_plant_shown_by_a_motion_and_adopted_and_undone(running, page):
     rig = running
-    name = begin(rig, page, plant=PLANT_NAME)
+    rig.until(lambda: page.state.get('investigations'), 'what was there before')
+    name = begin(rig, page, investigation=page.state['investigations'][-1]['id'])
+    # What the plant is good for is seen by a motion through either plant.
     plays(rig, page, name)
     page.does(pressed=False)
     rig.until(lambda: not any(rig.clutches[-1:]), 'the release')
     rig.passes(0.5)
     assert rig.stands()
-    holds(rig, page, lambda: not told(page, name)['plays'])
-    page.does(pressed=False)
-    assert rig.client.state == 'DISABLED'
-    assert rig.setting('compensator.mode') == 'bouc_wen'
-
-    # What the plant is good for is seen by a motion through either plant, held in the same way.
-    plays(rig, page, name)
     assert page.state['adopted']['words'] != 'no plant has been adopted'
     holds(rig, page, lambda: not told(page, name)['plays'])
     page.does(pressed=False)
+    assert rig.client.state == 'DISABLED'
     assert rig.setting('compensator.mode') == 'bouc_wen'
     asked = question(rig, page, name)
     assert asked['words'].startswith('Play this motion: Held-out motion of bend_x and bend_y')
@@ -163,9 +173,8 @@ def test_one_is_played_explained_and_its_plant_adopted_and_undone(running, page)
     assert any(sentence.startswith('Explained in') for sentence in it['sentences'])
     with urllib.request.urlopen(rig.server.address + it['report']) as answer:
         assert 'Commissioning of bend_x' in answer.read().decode()
-    folder = rig.folder / 'bags' / it['name']
-    (only,) = json.loads((folder / 'log.json').read_text())['rounds']
-    commands = open_bag(folder / only['bag']).joint_state(SLAVE_COMMAND)
+    played = rig.folder / 'bags' / it['name'] / 'tracking_described_1'
+    commands = open_bag(played).joint_state(SLAVE_COMMAND)
     assert abs(commands.select(['bend_x']).require('position')).max() > 0.1
 
     assert page.order('adopt', plant=it['improved'])['code'] == 'no_session'
@@ -178,12 +187,3 @@ def test_one_is_played_explained_and_its_plant_adopted_and_undone(running, page)
     assert answer['why'] == 'undone: no plant has been adopted', answer
     assert page.order('adopt')['code'] == 'nothing_to_undo'
     assert 'there is no plant' in page.order('adopt', plant='../../etc/passwd')['why']
-
-
-def test_what_happened_is_kept_with_a_reason(running, page):
-    answer = page.order('mark', reason='the wire has slipped')
-    assert answer['ok'], answer
-    path = running.folder / 'bags' / answer['why'].removeprefix('kept as ')
-    running.until((path / METADATA).is_file, 'the bag')
-    [event] = events_of(open_bag(path).metadata)
-    assert (event.kind, event.reason) == (MARK, 'the wire has slipped')

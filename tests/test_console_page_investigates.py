@@ -7,6 +7,9 @@ import pytest
 from browsed_console import BrowsedConsole, grip, hold_enable, shows, take, until
 from playwright.sync_api import expect
 
+from endoscope_bags import open_bag
+from endoscope_bags.event_bag import MARK, events_of
+from endoscope_bags.metadata import METADATA
 from endoscope_core.physics import PlantDescription, save_plant
 
 pytestmark = pytest.mark.engine
@@ -37,10 +40,14 @@ def page(running, browser):
         yield page
 
 
-def test_what_happened_is_kept_with_a_reason(page):
+def test_what_happened_is_kept_with_a_reason(running, page):
     page.fill('#mark-reason', 'the wire has slipped')
     page.click('#mark')
     shows(page, 'answer', re.compile(r'^Keep: done, kept as mark-\d+-\d+Z$'))
+    [path] = running.folder.glob('mark-*')
+    until(page, (path / METADATA).is_file, 'the bag')
+    [event] = events_of(open_bag(path).metadata)
+    assert (event.kind, event.reason) == (MARK, 'the wire has slipped')
     expect(page.locator('#mark-reason')).to_have_value('')
 
 

@@ -5,15 +5,18 @@ import json
 
 import numpy as np
 import pytest
+from simulated_graph import TICK_RATE
 
 from endoscope_bags import open_bag
 from endoscope_bringup import cli
+from endoscope_bringup.demo import live_graph
 from endoscope_bringup.demo.live_graph import NODES, LiveGraph
 from endoscope_core.errors import NotPlayedError, RigStoppedError
 from endoscope_core.physics import EffectSpec, PlantDescription, save_plant
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import hold, move, sequence
 from endoscope_core.signals.command_file import JOINTS, CommandTable, write_command_file
+from endoscope_explain.investigation import tracking
 from endoscope_explain.investigation.motions import Motion
 from endoscope_explain.investigation.tracking import held_out, tracked
 from endoscope_nodes.client.graph_parameters import read_parameter
@@ -24,6 +27,12 @@ from endoscope_nodes.nodes.recorder import RecorderNode
 pytestmark = pytest.mark.engine
 
 LARGEST = 0.5
+
+
+@pytest.fixture(autouse=True)
+def short(monkeypatch):
+    """Less of a motion shows, too, by which plant the tip follows better."""
+    monkeypatch.setattr(tracking, 'DURATION_S', 4.0)
 
 
 @pytest.fixture
@@ -48,7 +57,7 @@ def graph(rig=None, plant=None, folder=None):
         None,
         lock_step=True,
         overrides=overrides,
-        rate=250,
+        rate=TICK_RATE,
         rig=rig,
         nodes=(*NODES, RecorderNode),
     )
@@ -171,7 +180,8 @@ def test_without_a_person_to_ask_it_does_not_begin(tmp_path, capsys):
     assert not (tmp_path / 'out').exists()
 
 
-def test_a_rig_as_described_is_explained_by_one_motion(tmp_path, capfd):
+def test_a_rig_as_described_is_explained_by_one_motion(tmp_path, capfd, monkeypatch):
+    monkeypatch.setitem(live_graph.RATE, True, TICK_RATE)
     plant, out = tmp_path / 'plant.yaml', tmp_path / 'out'
     save_plant(PlantDescription(), plant)
     words = ['investigate', '--plant', str(plant), '--simulate', str(plant), '--attended']

@@ -75,9 +75,15 @@ class ServedConsole(ClosedOnExit):
     """The program, started in a folder and reached under origins of relays too; and a listener."""
 
     def __init__(
-        self, folder: Path, domain: int, origins: tuple[str, ...] = (), *, real_time: bool = False
+        self,
+        folder: Path,
+        domain: int,
+        origins: tuple[str, ...] = (),
+        *,
+        real_time: bool = False,
+        graph: str = '',
     ) -> None:
-        words = [f'--origin={origin}' for origin in origins]
+        words = [f'--origin={origin}' for origin in origins] + [f'--graph={graph}']
         words += ['--real-time'] if real_time else []
         self.log = folder / 'console.log'
         with self.log.open('w') as log:
