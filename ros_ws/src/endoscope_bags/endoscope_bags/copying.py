@@ -101,7 +101,8 @@ def recover(source: str | Path, target: str | Path) -> RecoveryReport:
     recording = open_bag(source, salvage=True)
     with BagWriter(target, records=copied_records(recording)) as writer:
         _copy(recording, writer)
-        writer.close({'recovered_from': Path(source).name, **_numbered(recording.damage)})
+        damage = {f'damage_{n}': what for n, what in enumerate(recording.damage, start=1)}
+        writer.close({'recovered_from': Path(source).name, **damage})
         counts = writer.counts
     return RecoveryReport(
         recording.message_count, counts, recording.start_ns, recording.end_ns, recording.damage
@@ -122,7 +123,3 @@ def _copy(recording: Recording, writer: BagWriter) -> None:
             message.publish_ns,
             message.sequence,
         )
-
-
-def _numbered(damage: tuple[str, ...]) -> dict[str, str]:
-    return {f'damage_{number}': what for number, what in enumerate(damage, start=1)}

@@ -100,6 +100,20 @@ SECONDS = within(1e-3, 3600.0, float)
 """A time to wait."""
 
 
+def add_graph_options(
+    parser: argparse.ArgumentParser, awaited: str = 'an answer', of: str = 'of the graph'
+) -> None:
+    """Add `--namespace` and `--timeout` to a command that asks a running graph."""
+    parser.add_argument('--namespace', default='endoscope', help=f'{of} (default: %(default)s)')
+    parser.add_argument(
+        '--timeout',
+        type=SECONDS,
+        default=10.0,
+        metavar='S',
+        help=f'how long to wait for {awaited} (default: %(default)g)',
+    )
+
+
 def add_json_option(parser: argparse.ArgumentParser) -> None:
     """Add `--json` to a command that prints a table; see `print_json`."""
     parser.add_argument(

@@ -70,19 +70,9 @@ class Explanation:
 
     def as_mapping(self) -> dict[str, Any]:
         """What a page is told of it."""
-        return {
-            'id': self.id,
-            'bag': self.bag,
-            'plant': self.plant,
-            'running': self.running,
-            'step': self.step,
-            'progress': self.progress,
-            'sentence': self.sentence,
-            'report': self.report,
-            'error': self.error or None,
-            'experiment': self.experiment,
-            'improved': self.improved,
-        }
+        told = ('id', 'bag', 'plant', 'running', 'step', 'progress', 'sentence', 'report')
+        values = {key: getattr(self, key) for key in (*told, 'experiment', 'improved')}
+        return values | {'error': self.error or None}
 
 
 class Explanations:

@@ -97,19 +97,12 @@ class Investigation:
     def as_mapping(self) -> dict[str, Any]:
         """What a page is told of it."""
         asked = self.question
-        return {
-            'id': self.id,
+        told = ('id', 'running', 'plays', 'step', 'sentence', 'goes_on', 'report', 'improved')
+        return {key: getattr(self, key) for key in told} | {
             'name': self.folder.name,
-            'running': self.running,
-            'plays': self.plays,
-            'step': self.step,
             'sentences': self.sentences[-_SENTENCES:],
             'question': asked and {'id': asked.id, 'words': asked.words, 'why': asked.why},
-            'sentence': self.sentence,
             'error': self.error or None,
-            'goes_on': self.goes_on,
-            'report': self.report,
-            'improved': self.improved,
         }
 
 

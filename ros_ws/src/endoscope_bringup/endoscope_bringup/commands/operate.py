@@ -2,7 +2,7 @@
 
 import argparse
 
-from endoscope_bringup.subcommands import SECONDS
+from endoscope_bringup.subcommands import add_graph_options
 
 MOVING = ('enable', 'resume', 'home', 'calibrate')
 DONE, REFUSED = 0, 1
@@ -46,16 +46,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     common = argparse.ArgumentParser(add_help=False)
     common.add_argument('--json', action='store_true', help='print one JSON object instead')
-    common.add_argument(
-        '--namespace', default='endoscope', help='of the graph (default: %(default)s)'
-    )
-    common.add_argument(
-        '--timeout',
-        type=SECONDS,
-        default=10.0,
-        metavar='S',
-        help='how long to wait for an answer (default: %(default)g)',
-    )
+    add_graph_options(common)
     actions = parser.add_subparsers(dest='action', metavar='ACTION', required=True)
     for name, words in _ACTIONS.items():
         more = f' {_INTERRUPTED}' if name in MOVING else ''

@@ -2,7 +2,7 @@
 
 import argparse
 
-from endoscope_bringup.subcommands import SECONDS, within
+from endoscope_bringup.subcommands import add_graph_options, within
 
 _KEYS = """\
 keys:
@@ -51,16 +51,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         type=within(0.01, 10.0, float),
         help="slave motion for one radian of the handle; default the master's own",
     )
-    parser.add_argument(
-        '--namespace', default='endoscope', help='of the graph (default: %(default)s)'
-    )
-    parser.add_argument(
-        '--timeout',
-        type=SECONDS,
-        default=10.0,
-        metavar='S',
-        help='how long to wait for an answer of the graph (default: %(default)g)',
-    )
+    add_graph_options(parser, 'an answer of the graph')
 
 
 def run(args: argparse.Namespace) -> int:

@@ -2,7 +2,7 @@
 
 import argparse
 
-from endoscope_bringup.subcommands import COUNT, SECONDS
+from endoscope_bringup.subcommands import COUNT, SECONDS, add_graph_options
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -20,18 +20,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument('--count', type=COUNT, metavar='N', help='end after N messages')
     parser.add_argument('--seconds', type=SECONDS, metavar='S', help='end after S seconds')
     parser.add_argument('--json', action='store_true', help='the list as JSON')
-    parser.add_argument(
-        '--namespace',
-        default='endoscope',
-        help='of the graph and of names that begin with no / (default: %(default)s)',
-    )
-    parser.add_argument(
-        '--timeout',
-        type=SECONDS,
-        default=10.0,
-        metavar='S',
-        help='how long to wait for a sender (default: %(default)g)',
-    )
+    add_graph_options(parser, 'a sender', 'of the graph and of names that begin with no /')
 
 
 def run(args: argparse.Namespace) -> int:

@@ -34,38 +34,19 @@ class LiveGraph(ClosedOnExit):
 
     The recording lasts from the beginning to :meth:`stop`; there is none without a bag. In
     lock-step simulated time goes on as the nodes follow, else the wall clock gives it.
-
-    Parameters
-    ----------
-    bag : Path or None
-        Folder to be made for the recording.
-    domain : int, optional
-        ROS domain; by default this process's own.
-    lock_step : bool
-        Whether time is simulated.
-    overrides : dict
-        Parameters by node.
-    rate : int, optional
-        Ticks a second, by default `RATE`.
-    rig : Rig, optional
-        By default the shipped one.
-    nodes : sequence, optional
-        What makes each node, by default `NODES`.
-    log_level : str, optional
-        Least severe level that nodes print, by default fatal.
     """
 
     def __init__(
         self,
-        bag: Path | None,
-        domain: int | None = None,
+        bag: Path | None,  # folder to be made for the recording
+        domain: int | None = None,  # by default this process's own
         *,
-        lock_step: bool,
-        overrides: dict[str, dict[str, object]],
-        rate: int = 0,
-        rig: Rig | None = None,
+        lock_step: bool,  # whether time is simulated
+        overrides: dict[str, dict[str, object]],  # parameters by node
+        rate: int = 0,  # ticks a second, by default `RATE`
+        rig: Rig | None = None,  # by default the shipped one
         nodes: Sequence[Callable[[NodeContext], EndoscopeNode]] = NODES,
-        log_level: str = 'fatal',
+        log_level: str = 'fatal',  # the least severe that nodes print
     ) -> None:
         given = dict(overrides)
         if lock_step:

@@ -17,8 +17,9 @@ POINTS = 40
 
 _INPUT = struct.Struct('<BBHIIIdff')
 _HEAD = struct.Struct('<BBHIdd')
-_PRESSED, _TURBO, _VISIBLE, _FOCUSED, _POSITION_MODE = 1, 2, 4, 8, 16
-_KNOWN_FLAGS = 31
+_FLAGS = 1, 2, 4, 8, 16
+"""Of the first five fields of an input frame."""
+_KNOWN_FLAGS = sum(_FLAGS)
 # 300 years: more is no time, and no number of ns that a float tells apart.
 _LAST_S = 1e10
 _F32 = np.dtype('<f4')
@@ -69,19 +70,9 @@ def decode_input(data: bytes) -> InputFrame:
         raise MalformedFrameError(f'a page has no source {source}')
     if not (abs(t) <= _LAST_S and math.isfinite(x) and math.isfinite(y)):
         raise MalformedFrameError(f'no time in s and two angles: {t}, {x}, {y}')
+    pressed, turbo, visible, focused, position_mode = (bool(flags & flag) for flag in _FLAGS)
     return InputFrame(
-        pressed=bool(flags & _PRESSED),
-        turbo=bool(flags & _TURBO),
-        visible=bool(flags & _VISIBLE),
-        focused=bool(flags & _FOCUSED),
-        position_mode=bool(flags & _POSITION_MODE),
-        source=source,
-        seq=seq,
-        grip=grip,
-        seen=seen,
-        t=t,
-        x=x,
-        y=y,
+        *(pressed, turbo, visible, focused, position_mode), source, seq, grip, seen, t, x, y
     )
 
 

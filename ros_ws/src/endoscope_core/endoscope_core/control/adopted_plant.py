@@ -187,7 +187,7 @@ def _tried(
 
     def missed(sent: Array) -> Array:
         """Rms error (J,) in rad."""
-        left = (_tip(plant, limits, sent) - desired)[steady]
+        left = (simulate(plant, limits.gear * sent).bending_true - desired)[steady]
         return np.nan_to_num(np.sqrt(np.mean(left**2, axis=0)), nan=np.inf)
 
     def followed(tried: tuple[PhysicalParameters, ...]) -> Array:
@@ -226,7 +226,3 @@ def _with_less(joint: PhysicalParameters) -> list[PhysicalParameters]:
     kept = [tuple(e for e in joint.added if e not in part) for part in parts]
     kept += [()] if len(parts) > 1 else []
     return [replace(joint, added=each) for each in kept]
-
-
-def _tip(plant: PlantDescription, limits: MotorLimits, command: Array) -> Array:
-    return simulate(plant, limits.gear * command).bending_true

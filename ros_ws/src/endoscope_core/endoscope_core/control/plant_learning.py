@@ -83,7 +83,6 @@ class PlantLearning:
     ) -> None:
         self.settings = settings or PlantLearningSettings()
         self.parameters = parameters  # as estimated
-        self.resets = 0  # how often the tube was taken to have changed
         self._first = parameters
         self._names = tuple(LEARNT)
         self._logs = np.zeros(len(LEARNT))
@@ -173,7 +172,6 @@ class PlantLearning:
         self._surprises = self._surprises + 1 if innovation**2 > c.surprise**2 * spread else 0
         if self._surprises >= c.surprises and self._time - self._last_reset > c.reset_pause:
             self._surprises = 0
-            self.resets += 1
             self._last_reset = self._time
             self._unexplained = 1.0
             # Covariance resetting (Goodwin and Sin 1984, section 3.3): the tube has been bent.

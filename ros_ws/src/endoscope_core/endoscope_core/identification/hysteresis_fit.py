@@ -66,11 +66,9 @@ def _bouc_wen(shape: Array, factors: Array, offset: float) -> BoucWenParameters:
 def _dahl(shape: Array, factors: Array, offset: float) -> DahlParameters:
     (alpha, lag), exponent = factors.tolist(), float(shape[1])
     travel = _travel(shape[0], alpha, lag, 2.0**exponent)
-    return DahlParameters(alpha, lag, travel, exponent, _bounded(offset))
-
-
-def _bounded(offset: float) -> float:
-    return float(np.clip(offset, -GREATEST_OFFSET, GREATEST_OFFSET))
+    return DahlParameters(
+        alpha, lag, travel, exponent, float(np.clip(offset, -GREATEST_OFFSET, GREATEST_OFFSET))
+    )
 
 
 FAMILIES: dict[str, ModelFamily] = {

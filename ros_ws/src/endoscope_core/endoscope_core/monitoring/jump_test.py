@@ -75,49 +75,24 @@ class Block:
 
 @dataclass(frozen=True)
 class Jumps:
-    """What W windows and K changes say at one moment.
+    """What W windows and K changes say at one moment."""
 
-    Attributes
-    ----------
-    gain : array (W, K)
-        Gain of the logarithm of the likelihood by a jump where a window begins.
-    size : array (W, K)
-        Its likeliest size, in steps.
-    """
-
-    gain: Array
-    size: Array
+    gain: Array  # (W, K), of the likelihood's logarithm by a jump where a window begins
+    size: Array  # (W, K), its likeliest size, in steps
 
 
 class JumpTest:
-    """Estimate and test of one joint.
-
-    Parameters
-    ----------
-    tolerance : array (D,)
-        Rms of each number of a healthy rig.
-    drift : array (D,)
-        Rms of its change in a block.
-    along : array (K, D)
-        Directions of the changes that are told.
-    one_way : array (K,) of bool
-        Whether only a positive jump is one.
-    least : array (K,)
-        Smallest size of a jump.
-    noise : array (C,)
-        First guess of the rms of a bin's residual.
-    windows : array (W,)
-        Lengths that are tried, in blocks; the last is how old what enters the estimate is.
-    """
+    """Estimate and test of one joint."""
 
     def __init__(
         self,
-        tolerance: Array,
-        drift: Array,
-        along: Array,
-        one_way: NDArray[np.bool_],
-        least: Array,
-        noise: Array,
+        tolerance: Array,  # (D,), rms of each number of a healthy rig
+        drift: Array,  # (D,), rms of its change in a block
+        along: Array,  # (K, D), directions of the changes that are told
+        one_way: NDArray[np.bool_],  # (K,), whether only a positive jump is one
+        least: Array,  # (K,), smallest size of a jump
+        noise: Array,  # (C,), first guess of the rms of a bin's residual
+        # (W,), lengths that are tried, in blocks; the last is how old what enters the estimate is.
         windows: NDArray[np.int64],
     ) -> None:
         self._along, self._one_way, self._least = along, one_way, least

@@ -90,11 +90,6 @@ class PredictionBank:
 
     Derivatives are differences to a copy of the plant that is one step off, so they are of the
     size of a real change.
-
-    Parameters
-    ----------
-    plant : PlantDescription
-        The rig as described.
     """
 
     def __init__(self, plant: PlantDescription) -> None:
@@ -119,18 +114,10 @@ class PredictionBank:
             self._servos[j].rest(float(shaft[j]))
 
     def behind_motors(self, shaft: Array) -> Array:
-        """Readings and derivatives behind the motors.
+        """Readings behind the motors at measured shaft angles (N, J) in rad, every `TICK_S`.
 
-        Parameters
-        ----------
-        shaft : array (N, J)
-            Measured shaft angle in rad, every `TICK_S`.
-
-        Returns
-        -------
-        array (J, N + 1, 4, 1 + D)
-            `READINGS` (N, N, N m, rad) as predicted, then their derivatives by a step of each
-            direction. Row k is before angle k is reached.
+        (J, N + 1, 4, 1 + D): `READINGS` (N, N, N m, rad) as predicted, then their derivatives by a
+        step of each direction. Row k is before angle k is reached.
         """
         joints, ticks = shaft.shape[1], len(shaft)
         inputs = np.zeros((joints, ticks, layout.INPUTS))
@@ -155,17 +142,9 @@ class PredictionBank:
         return result
 
     def motors(self, setpoint: Array) -> Array:
-        """Shaft angles and derivatives.
+        """Shaft angles of motors that are sent to setpoints (N, J), in rad, every `SERVO_TICK_S`.
 
-        Parameters
-        ----------
-        setpoint : array (N, J)
-            To where the motors are sent, in rad, every `SERVO_TICK_S`.
-
-        Returns
-        -------
-        array (J, N, 1 + D)
-            In rad, as `behind_motors`; row k is before setpoint k is in force.
+        (J, N, 1 + D) in rad, as `behind_motors`; row k is before setpoint k is in force.
         """
         result = np.zeros((len(self._servos), len(setpoint), 1 + len(DIRECTIONS)))
         inputs = np.zeros(layout.INPUTS)

@@ -40,34 +40,15 @@ class Part(StrEnum):
 
 @dataclass(frozen=True)
 class Direction:
-    """One number of a joint, counted in steps.
+    """One number of a joint, counted in steps."""
 
-    Attributes
-    ----------
-    name : str
-        Of the number.
-    step : float
-        What one step is: SI, or a share of the number where `scaled`.
-    tolerance : float
-        Rms by which a healthy rig's number is off from the described one, in steps.
-    drift : float
-        Rms by which it changes in `DRIFT_S` of motion of a healthy rig, in steps.
-    number : str
-        Key of the joint's parameters that it is added to, or empty.
-    scaled : bool
-        Whether the step is a share of that number.
-    effect, parameter : str
-        Effect of the catalogue and its parameter, with the values of `at` besides, or empty.
-    at : Mapping[str, float]
-        Other parameters of that effect.
-    """
-
-    name: str
-    step: float
-    tolerance: float = 0.0
-    drift: float = 0.0
-    number: str = ''
-    scaled: bool = False
+    name: str  # of the number
+    step: float  # what one step is: SI, or a share of the number where `scaled`
+    tolerance: float = 0.0  # rms by which a healthy rig's is off from the described one, in steps
+    drift: float = 0.0  # rms by which it changes in `DRIFT_S` of motion of a healthy rig, in steps
+    number: str = ''  # key of the joint's parameters that it is added to, or empty
+    scaled: bool = False  # whether the step is a share of that number
+    # Effect of the catalogue and its parameter, or empty, and its other parameters.
     effect: str = ''
     parameter: str = ''
     at: Mapping[str, float] = field(default_factory=dict)

@@ -12,19 +12,11 @@ _SAME_S = 1e-6
 
 @dataclass
 class Samples:
-    """Samples of one topic in the order of their times, in s.
+    """Samples of one topic in the order of their times, in s."""
 
-    Attributes
-    ----------
-    columns : int
-        Numbers in a sample.
-    time : array (N,)
-    values : array (N, columns)
-    """
-
-    columns: int
-    time: Array = field(default_factory=lambda: np.empty(0))
-    values: Array = field(init=False)
+    columns: int  # numbers in a sample
+    time: Array = field(default_factory=lambda: np.empty(0))  # (N,)
+    values: Array = field(init=False)  # (N, columns)
 
     def __post_init__(self) -> None:
         self.values = np.empty((0, self.columns))

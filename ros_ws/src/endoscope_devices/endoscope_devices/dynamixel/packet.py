@@ -83,7 +83,6 @@ class PacketReader:
 
     def __init__(self) -> None:
         self.wrong_crc = 0  # packets dropped for their CRC or their stuffing
-        self.skipped = 0  # bytes dropped because they belong to no packet
         self._buffer = bytearray()
 
     def clear(self) -> None:
@@ -105,14 +104,14 @@ class PacketReader:
             if start < 0:
                 # The end may be the beginning of a header.
                 keep = next((k for k in (3, 2, 1) if buffer.endswith(HEADER[:k])), 0)
-                self._skip(len(buffer) - keep)
+                del buffer[: len(buffer) - keep]
                 return None
-            self._skip(start)
+            del buffer[:start]
             if len(buffer) < PREFIX_SIZE:
                 return None
             length = buffer[5] | buffer[6] << 8
             if not 1 + CRC_SIZE <= length <= LARGEST_LENGTH:
-                self._skip(1)
+                del buffer[:1]
                 continue
             size = PREFIX_SIZE + length
             if len(buffer) < size:
@@ -122,12 +121,7 @@ class PacketReader:
             right = crc16(raw[:-CRC_SIZE]) == int.from_bytes(raw[-CRC_SIZE:], 'little')
             if not right or body.count(_BARE) != body.count(_STUFFED):
                 self.wrong_crc += 1
-                self._skip(1)
+                del buffer[:1]
                 continue
             del buffer[:size]
             return Packet(raw[4], body[0], body[1:].replace(_STUFFED, _BARE), size)
-
-    def _skip(self, count: int) -> None:
-        if count > 0:
-            self.skipped += count
-            del self._buffer[:count]

@@ -22,11 +22,12 @@ class LineLostError(DeviceError):
     """The line went away: unplugged, or closed by the other side."""
 
 
-class Line(ABC):
+class Line[Opened: serial.Serial | socket.socket](ABC):
     """A byte stream, used by one thread; LineLostError where it goes away."""
 
     def __init__(self, name: str) -> None:
         self._name = name
+        self._handle: Opened | None = None
 
     @abstractmethod
     def open(self) -> None:
@@ -53,9 +54,17 @@ class Line(ABC):
             raise LineLostError(f'{self._name} is gone: {error}') from error
         return data
 
-    @abstractmethod
     def close(self) -> None:
         """Let go of it."""
+        if self._handle is not None:
+            self._handle.close()
+            self._handle = None
+
+    @property
+    def _opened(self) -> Opened:
+        if self._handle is None:
+            raise LineLostError(f'{self._name} is not connected')
+        return self._handle
 
     @abstractmethod
     def _send(self, data: bytes) -> None:
@@ -66,7 +75,7 @@ class Line(ABC):
         """Bytes that arrive within `timeout` s, none if none do; errors as in `_send`."""
 
 
-class SerialLine(Line):
+class SerialLine(Line[serial.Serial]):
     """A serial port, silent between frames as Modbus over Serial Line V1.02, 2.5.1.1 asks for.
 
     That is 3.5 characters, or 1.75 ms above 19200 baud.
@@ -78,12 +87,11 @@ class SerialLine(Line):
         self._settings = settings
         self._silence_s = 3.5 * _BITS / settings.baud if settings.baud <= 19200 else 0.00175
         self._heard_s = 0.0
-        self._port: serial.Serial | None = None
 
     def open(self) -> None:
         """See :class:`Line`."""
         try:
-            self._port = serial.Serial(
+            self._handle = serial.Serial(
                 self._path,
                 self._settings.baud,
                 parity=self._settings.parity[0].upper(),
@@ -97,12 +105,6 @@ class SerialLine(Line):
                 f'{self._name} cannot be opened ({error}): is it plugged in and yours?'
             ) from error
 
-    def close(self) -> None:
-        """See :class:`Line`."""
-        if self._port is not None:
-            self._port.close()
-            self._port = None
-
     def _send(self, data: bytes) -> None:
         time.sleep(max(0.0, self._heard_s + self._silence_s - time.monotonic()))
         self._opened.write(data)
@@ -115,14 +117,8 @@ class SerialLine(Line):
             self._heard_s = time.monotonic()
         return data
 
-    @property
-    def _opened(self) -> serial.Serial:
-        if self._port is None:
-            raise LineLostError(f'{self._name} is closed')
-        return self._port
 
-
-class TcpLine(Line):
+class TcpLine(Line[socket.socket]):
     """A TCP connection to ``HOST`` or ``HOST:PORT``, by default port 502.
 
     DeviceError where the address cannot be understood.
@@ -134,23 +130,16 @@ class TcpLine(Line):
             raise DeviceError(f"'{address}' is not an address: give HOST or HOST:PORT")
         self._address = (host, int(port) if port else MODBUS_TCP_PORT)
         super().__init__(f'{self._address[0]}:{self._address[1]}')
-        self._socket: socket.socket | None = None
 
     def open(self) -> None:
         """See :class:`Line`."""
         try:
-            self._socket = socket.create_connection(self._address, _CONNECTS_S)
-            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._handle = socket.create_connection(self._address, _CONNECTS_S)
+            self._handle.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         except OSError as error:
             raise LineLostError(
                 f'{self._name} does not accept a connection ({error}): is the transmitter on?'
             ) from error
-
-    def close(self) -> None:
-        """See :class:`Line`."""
-        if self._socket is not None:
-            self._socket.close()
-            self._socket = None
 
     def _send(self, data: bytes) -> None:
         self._opened.sendall(data)
@@ -163,9 +152,3 @@ class TcpLine(Line):
         if not data:
             raise LineLostError(f'{self._name} closed the connection')
         return data
-
-    @property
-    def _opened(self) -> socket.socket:
-        if self._socket is None:
-            raise LineLostError(f'{self._name} is not connected')
-        return self._socket

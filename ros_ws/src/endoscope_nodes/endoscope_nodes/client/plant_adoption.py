@@ -172,12 +172,8 @@ class AdoptedPlants:
     def adopt(self, plant: str, patience_s: float = PATIENCE_S) -> PlantInForce:
         """Have a plant file's text put into force; empty: the plant before.
 
-        Raises
-        ------
-        RefusedAdoptionError
-            If it is refused, or withdrawn because it took too long: why, with a code.
-        GraphError
-            If nobody answers in time.
+        RefusedAdoptionError, with why, if it is refused, or withdrawn because it took too long;
+        GraphError if nobody answers in time.
         """
         client = self._client
         if client.state == 'FAULT':
