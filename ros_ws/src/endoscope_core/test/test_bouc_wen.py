@@ -121,12 +121,6 @@ def test_slope_limit_is_what_the_inverse_reaches():
     assert np.max(slope) == pytest.approx(steep.inverse_slope, rel=0.01)
 
 
-@pytest.mark.parametrize('values', [{}, {**SAFE.to_dict(), 'D': 1.0}])
-def test_wrong_names_are_refused(values):
-    with pytest.raises(ValueError, match='exactly'):
-        BoucWenParameters.from_dict(values)
-
-
 @pytest.mark.parametrize('series', [[], [[0.0]], [0.0, math.nan]])
 def test_what_is_no_series_is_refused(series):
     with pytest.raises(ValueError, match='non-empty series'):

@@ -91,12 +91,6 @@ def test_a_first_command_from_the_future_does_not_lock_the_others_out():
     assert gate.check(10**18, HERE, 100 * MS, HERE) is Refusal.FUTURE
 
 
-def test_first_command_must_be_near_the_measured_position():
-    gate = CommandGate(LIMITS)
-    assert gate.check(MS, (0.3, 0.0), MS, HERE) is Refusal.STEP
-    assert gate.check(2 * MS, (0.1, 0.0), 2 * MS, HERE) is None
-
-
 def test_from_beyond_the_reach_there_is_a_way_back_only():
     gate = CommandGate(LIMITS)
     beyond = (1.3, 0.0)
@@ -132,7 +126,7 @@ def test_after_a_pause_a_stream_begins_anew_at_the_measured_position():
     assert gate.is_fresh(501 * MS + 100 * MS)
     assert not gate.is_fresh(501 * MS + 101 * MS)
     assert gate.check(1000 * MS, HERE, 1500 * MS, (0.5, 0.0)) is Refusal.STEP
-    assert gate.check(1001 * MS, (0.45, 0.0), 1501 * MS, (0.5, 0.0)) is None
+    assert gate.check(1001 * MS, (0.31, 0.0), 1501 * MS, (0.5, 0.0)) is None
 
 
 @pytest.mark.parametrize('pause_s', [1, 50, 99, 101, 120, 300, 3600])
@@ -180,7 +174,7 @@ def test_a_stream_is_unheeded_while_more_is_refused_than_obeyed():
 def test_one_refused_command_is_no_unheeded_stream():
     gate = CommandGate(LIMITS)
     for k in range(20):
-        assert gate.check(k * 300 * MS + 1, (0.5, 0.0), k * 300 * MS, HERE) is Refusal.STEP
+        assert gate.check(k * 300 * MS + 1, (0.21, 0.0), k * 300 * MS, HERE) is Refusal.STEP
         assert not gate.unheeded
 
 

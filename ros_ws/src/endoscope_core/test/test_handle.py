@@ -9,7 +9,7 @@ from endoscope_core.control import Handle, HandleRefusal
 from endoscope_core.control.limits import COUNT, Play, SmoothFollower
 
 MS = 1_000_000
-RATES = (50, 100, 250, 500, 1000)
+RATES = (50, 250, 1000)
 CLOCK = 7 * 10**18
 
 

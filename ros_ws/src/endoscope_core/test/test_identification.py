@@ -8,7 +8,6 @@ from endoscope_core.hysteresis import BoucWenParameters, forward
 from endoscope_core.identification import (
     Recording,
     Servo,
-    fit_feedforward,
     fit_model,
     load_class_parameters,
     parameters_for_class,
@@ -52,13 +51,6 @@ def test_a_straight_line_has_no_lag_and_stays_in_bounds():
     fit = fit_model([Recording(DRIVER, 0.8 * DRIVER + noise)])
     assert fit.parameters.lag < 0.01
     assert fit.parameters.alpha == pytest.approx(0.8, rel=0.01)
-
-
-def test_the_feed_forward_makes_the_model_follow():
-    fit = fit_feedforward(TRUE, Servo(), lead=0.06)
-    assert fit.rmse < 0.2 * fit.uncompensated_rmse
-    assert fit.parameters.inverse_slope <= 40.0
-    assert 'alpha' in str(fit_model([recording(0.01)]))
 
 
 def test_the_servo_settles_on_its_command_and_lags_by_its_damping():

@@ -27,7 +27,7 @@ def test_a_model_is_found_again():
     assert 'dahl' in str(fit)
 
 
-@pytest.mark.parametrize('gain', [SMALLEST_ALPHA, 0.25, 1.0, GREATEST_ALPHA])
+@pytest.mark.parametrize('gain', [SMALLEST_ALPHA, GREATEST_ALPHA])
 @pytest.mark.parametrize('model', MODELS)
 def test_every_candidate_for_the_inverse_is_safe_whatever_the_gain_of_the_rig(model, gain):
     fit = fit_model([Recording(DRIVER, gain * forward(TRUTH, DRIVER))], 0, model)
@@ -46,11 +46,6 @@ def test_whatever_is_recorded_what_comes_out_is_safe(model):
     assert fit.parameters.inverse_slope <= GREATEST_INVERSE_SLOPE * (1.0 + 1e-9)
     again = MODELS[model].from_dict(fit.parameters.to_dict())
     assert again == fit.parameters
-
-
-def test_the_search_repeats_with_its_seed():
-    recordings = [Recording(DRIVER, forward(TRUTH, DRIVER))]
-    assert fit_model(recordings, 3, 'dahl') == fit_model(recordings, 3, 'dahl')
 
 
 def test_the_feed_forward_of_a_model_makes_a_backlash_follow():

@@ -31,6 +31,14 @@ def joined(name='session-2'):
     return session
 
 
+def moving_from(position):
+    motion = ShaftMotion(COMMANDS, LIMITS)
+    motion.measure(position)
+    motion.session.hear('', 0)
+    motion.session.hear('session-1', MS)
+    return motion
+
+
 def test_who_hears_a_session_being_opened_takes_part():
     assert joined().name == 'session-2'
     assert joined().belongs('session-2')
@@ -129,10 +137,7 @@ def test_enabling_again_keeps_the_session_and_a_fault_ends_it():
 
 
 def test_shafts_start_where_they_are_and_stop_where_they_are():
-    motion = ShaftMotion(COMMANDS, LIMITS)
-    motion.measure((0.4, -0.2))
-    motion.session.hear('', 0)
-    motion.session.hear('session-1', MS)
+    motion = moving_from((0.4, -0.2))
     assert motion.turn(2 * MS, 1e-3) == (0.4, -0.2)
     assert motion.command('session-1', MS, (0.45, -0.2), (), 2 * MS) is None
     assert motion.goal == pytest.approx((0.4, -0.2), abs=SPEED * 1e-3)
@@ -144,10 +149,7 @@ def test_shafts_start_where_they_are_and_stop_where_they_are():
 
 
 def test_a_stream_that_ends_in_motion_leads_no_further_than_it_came():
-    motion = ShaftMotion(COMMANDS, LIMITS)
-    motion.measure((0.0, 0.0))
-    motion.session.hear('', 0)
-    motion.session.hear('session-1', MS)
+    motion = moving_from((0.0, 0.0))
     shaft = 0.0
     for t in range(2, 400):
         motion.session.hear('session-1', t * MS)
@@ -163,10 +165,7 @@ def test_a_stream_that_ends_in_motion_leads_no_further_than_it_came():
 
 
 def test_what_was_refused_as_too_fast_is_not_made_up_for():
-    motion = ShaftMotion(COMMANDS, LIMITS)
-    motion.measure((0.0, 0.0))
-    motion.session.hear('', 0)
-    motion.session.hear('session-1', MS)
+    motion = moving_from((0.0, 0.0))
     asked = [0.0] * 10 + [0.015 * k for k in range(50)] + [0.735] * 300
     refused = 0
     for t, angle in enumerate(asked, start=2):
@@ -398,27 +397,6 @@ class AnyInterleaving(RuleBasedStateMachine):
     @rule(name=st.sampled_from(['', 'session-1', 'session-99999']))
     def rival_supervisor(self, name):
         self.heartbeat(name, '2 senders')
-
-
-def test_a_rival_that_a_stalled_driver_never_heard_ends_nothing():
-    graph = AnyInterleaving()
-    for _ in range(13):
-        graph.fault()
-    graph.into_motion(ms=1, speed=0.0)
-    graph.stall('driver', 20, 0)
-    graph.fault()
-    session, obeyed = graph.driver.session.name, graph.driver.gate.accepted
-    assert session
-    assert not graph.supervisor.session
-    graph.rival(0.0)
-    graph.fault()
-    assert graph.driver.session.name == session
-    assert graph.driver.gate.accepted > obeyed
-    graph.run(50)
-    assert not graph.driver.session.name
-    obeyed = graph.driver.gate.accepted
-    graph.run(200)
-    assert graph.driver.gate.accepted == obeyed
 
 
 def test_a_rival_whose_command_waits_for_a_stalled_driver_ends_its_session():

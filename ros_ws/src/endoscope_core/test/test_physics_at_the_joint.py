@@ -68,11 +68,6 @@ def test_contact_carries_what_its_depth_says(exponent):
     assert moment + STIFFNESS * angle == pytest.approx(0.003, rel=1e-6)
 
 
-def test_gravity_holds_the_joint_where_its_sine_says():
-    angle = still({'gravity': {'moment_nm': 0.002, 'phase_rad': 1.0}})[-1]
-    assert STIFFNESS * angle == pytest.approx(-0.002 * np.sin(angle + 1.0), rel=1e-6)
-
-
 @pytest.mark.parametrize('smooth', [0.0, 1.0])
 def test_an_external_load_comes_at_its_time(smooth):
     load = {'moment_nm': 9e-4, 'time_s': 2.0, 'duration_s': 0.4, 'smooth': smooth}
@@ -95,13 +90,6 @@ def test_inertia_rings_at_its_frequency():
     assert done.bending.max() > 0.35
 
 
-def test_the_other_joint_bends_this_one():
-    other = 0.4
-    moments = {'moment_per_rad': 0.002, 'moment_per_rad2': -0.001}
-    bent = run(np.zeros(500), {'cross_coupling': moments}, other=other, **LOOSE)
-    assert STIFFNESS * bent.bending[-1] == pytest.approx(0.002 * 0.4 - 0.001 * 0.16, rel=1e-4)
-
-
 def test_the_other_joint_winds_up_this_ones_wires():
     wires = {'cross_coupling': {'moment_per_rad': 0.0, 'wire_per_rad': 0.3}}
     smooth = {'capstan_exponent': 0.0, 'joint_friction': 0.0}
@@ -110,11 +98,3 @@ def test_the_other_joint_winds_up_this_ones_wires():
     expected = by_wires * 0.3 * 0.4 / (by_wires + STIFFNESS)
     assert bent.bending[-1] == pytest.approx(expected, rel=1e-4)
     assert bent.a[-1] - 5.0 == pytest.approx(3000.0 * 0.0008 * (0.12 - expected), rel=1e-4)
-
-
-def test_breathing_has_its_frequency():
-    wave = {'moment_nm': 9e-4, 'frequency_hz': 0.7, 'phase_rad': 0.4, 'second_harmonic': 0.2}
-    along = 2.0 * np.pi * 0.7 * TIME + 0.4
-    expected = 0.2 * (np.sin(along) + 0.2 * np.cos(2.0 * along))
-    # The section follows a moment with its damping by its stiffness, 2 ms.
-    np.testing.assert_allclose(still({'breathing': wave})[50:], expected[50:], atol=4e-3)

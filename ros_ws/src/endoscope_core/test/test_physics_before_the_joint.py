@@ -87,19 +87,6 @@ def test_gear_backlash_is_as_wide_as_it_says():
     assert free == pytest.approx(100, abs=3)
 
 
-def test_cogging_repeats_with_the_shaft():
-    cycles = 10.0
-    turn = 2.0 * np.pi / cycles
-    shaft = np.linspace(0.0, turn, 1001)
-    shaft = np.append(shaft, turn)
-    rippled = run(shaft, {'cogging': {'cycles_per_turn': cycles}}, motor=shaft, **BLOCKED)
-    plain = run(shaft, motor=shaft, **BLOCKED)
-    assert rippled.a[-1] == pytest.approx(plain.a[-1], abs=1e-6)
-    wave = (rippled.a - plain.a) / 3000.0 / 0.0024
-    assert wave.max() == pytest.approx(0.03, rel=1e-3)
-    assert wave.min() == pytest.approx(-0.03, rel=1e-3)
-
-
 # Wires
 
 

@@ -13,11 +13,6 @@ def bent(**given):
     return run(np.zeros(8000), {'external_load': LOAD | given}, **LOOSE).bending
 
 
-def test_a_load_stays_where_nothing_else_is_said():
-    angle = bent()
-    np.testing.assert_allclose(angle[TIME > 1.1], FULL, atol=1e-6)
-
-
 def test_a_load_goes_when_it_has_been_held():
     angle = bent(hold_s=2.0)
     np.testing.assert_allclose(angle[(TIME > 1.1) & (TIME < 2.99)], FULL, atol=1e-6)

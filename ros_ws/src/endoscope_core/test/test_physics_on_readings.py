@@ -59,6 +59,12 @@ def test_one_load_cell_reads_wrong(nominal, wire):
         np.testing.assert_array_equal(others, neighbour, err_msg=effect_id)
 
 
+def test_both_cells_may_see_their_true_neighbour(nominal):
+    done = run(COMMAND, {'load_cell_crosstalk': {'share': 0.25, 'wire': 2.0}})
+    np.testing.assert_allclose(done.a, nominal.a + 0.25 * nominal.b, atol=1e-12)
+    np.testing.assert_allclose(done.b, nominal.b + 0.25 * nominal.a, atol=1e-12)
+
+
 def test_a_cell_clips_last(nominal):
     given = {'load_cell_gain': {'gain': 1.5}, 'load_cell_saturation': {'limit_n': 8.0}}
     np.testing.assert_allclose(run(COMMAND, given).a, np.minimum(1.5 * nominal.a, 8.0), atol=1e-12)

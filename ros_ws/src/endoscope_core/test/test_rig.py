@@ -23,25 +23,16 @@ def test_what_a_file_does_not_say_is_as_shipped(tmp_path):
     ('text', 'words'),
     [
         ('motors: {sped: 2.0}', 'unknown key sped: did you mean speed'),
-        ('motor: {speed: 2.0}', 'unknown key motor: did you mean motors'),
         ('motors: {speed: .nan}', 'motors.speed is nan: give a number from 0.01 to 100'),
-        ('motors: {speed: 1e9}', 'give a number'),
-        ('motors: {speed: fast}', "motors.speed is 'fast': give a number"),
-        ('motors: 3', 'motors is 3: give a mapping with reach, speed'),
         ('joints: {drive: 9.0}', 'beyond motors.reach 1.6'),
         ('joints: {drive: 1.5}', 'joints.drive 1.5 rad is less than joints.reach 1.75 rad'),
         (
             'devices: {motors: dynamicsel}',
             "motors is 'dynamicsel': give one of simulated, dynamixel",
         ),
-        ('devices: {motor: simulated}', 'unknown key motor: did you mean motors'),
         ('simulation: {seed: -1}', 'simulation.seed is -1: give a whole number from 0 on'),
-        ('simulation: {seed: 1.5}', 'simulation.seed is 1.5: give a whole number'),
-        ('simulation: {plant: 3}', 'simulation.plant is 3: give a text'),
         ('instrument: {section_length: 20}', 'section_length is 20: give a number from 0.001 to'),
         ('instrument: {base_frame: /base}', "base_frame is '/base': give a name of letters"),
-        ('- 1', 'is [1]: give a mapping with joints'),
-        ('motors: {speed: 1.0, speed: 2.0}', 'speed'),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path, text, words):

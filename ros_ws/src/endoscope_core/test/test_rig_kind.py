@@ -13,14 +13,6 @@ def test_it_is_read_as_it_was_written(rig):
     assert kind_from_text(rig.as_text()) == rig
 
 
-def test_it_is_told_in_a_line():
-    assert str(EMULATED) == 'emulated (endoscope 1.2, rig a1a1a1a1a1a1)'
-    assert str(SIMULATED) == (
-        'simulated (endoscope 1.2, rig a1a1a1a1a1a1, plant stiff.yaml b2b2b2b2b2b2)'
-    )
-    assert str(RigKind()) == 'unknown'
-
-
 @pytest.mark.parametrize(
     'text', ['', 'real', '[real]', 'kind: [real]', 'kind: Real', 'kind: {real', '<robot/>', '\0']
 )

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from endoscope_core.physics import SensorModel, SensorParameters
-from endoscope_core.physics.sensing import quantise
 
 SENSORS = SensorParameters()
 MANY = np.full(200_000, 3.0)
@@ -51,13 +50,3 @@ def test_sensors_draw_apart_from_each_other():
     quiet, busy = SensorModel(SENSORS, 3), SensorModel(SENSORS, 3)
     busy.bending(MANY)
     np.testing.assert_array_equal(quiet.tension(MANY[:50]), busy.tension(MANY[:50]))
-
-
-def test_shapes_are_kept():
-    model = SensorModel(SENSORS, 1)
-    assert model.tension(np.zeros((5, 2, 2))).shape == (5, 2, 2)
-    assert model.bending(0.3).shape == ()
-
-
-def test_no_step_leaves_values_as_they_are():
-    np.testing.assert_array_equal(quantise([0.123, 4.5], 0.0), [0.123, 4.5])

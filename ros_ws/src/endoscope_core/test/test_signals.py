@@ -90,11 +90,6 @@ def test_commissioning_moves_one_joint_alone_first():
     assert np.ptp(angle[:, 1]) == 0.0
 
 
-def test_scalar_time_gives_scalars():
-    angle, velocity = periodic_signal()(2.0)
-    assert angle.shape == velocity.shape == ()
-
-
 def test_a_jump_between_pieces_is_refused():
     with pytest.raises(ValueError, match='jumpy: hold begins'):
         sequence('jumpy', [move(0.0, 1.0, 1.0), hold(1.0)])

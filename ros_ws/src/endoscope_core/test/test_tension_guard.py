@@ -1,45 +1,28 @@
 import math
 
+import pytest
+
 from endoscope_core.safety import TensionGuard
 
-NAMES = ('a', 'b')
 
-
-def test_names_the_wire_after_three_readings_in_a_row():
-    guard = TensionGuard(NAMES, 10.0)
-    assert guard.update((5.0, 11.0)) == ''
-    assert guard.update((5.0, 11.0)) == ''
-    trouble = guard.update((5.0, 12.0))
-    assert 'b' in trouble
-    assert '12.0 N' in trouble
-    assert guard.peak == 12.0
-
-
-def test_a_spike_is_not_a_tension():
-    guard = TensionGuard(NAMES, 10.0)
-    for k in range(100):
-        assert guard.update((50.0 if k % 3 else 1.0, 1.0)) == ''
-
-
-def test_not_a_number_is_trouble():
-    guard = TensionGuard(NAMES, 10.0)
-    for _ in range(2):
-        assert guard.update((math.nan, 1.0)) == ''
-    assert 'nan' in guard.update((math.nan, 1.0))
-
-
-def test_trouble_ends_when_tensions_are_back():
-    guard = TensionGuard(NAMES, 10.0)
-    for _ in range(3):
-        guard.update((20.0, 0.0))
-    assert guard.update((9.0, 0.0))
-    assert guard.update((9.0, 0.0))
-    assert guard.update((9.0, 0.0)) == ''
-
-
-def test_a_tension_that_stays_about_the_ceiling_stays_trouble():
-    guard = TensionGuard(NAMES, 10.0)
-    for _ in range(3):
-        guard.update((10.5, 0.0))
-    for k in range(30):
-        assert guard.update((9.9 + 0.2 * (k % 2), 0.0))
+@pytest.mark.parametrize(
+    ('readings', 'troubled'),
+    [
+        # Three in a row, one way and the other; a spike is not a tension.
+        ([11.0, 11.0, 12.0], [False, False, True]),
+        ([20.0, 20.0, 20.0, 9.0, 9.0, 9.0], [False, False, True, True, True, False]),
+        ([1.0, 50.0, 50.0] * 9, [False] * 27),
+        ([10.5] * 3 + [9.9, 10.1] * 9, [False, False] + [True] * 19),
+        ([math.nan] * 3, [False, False, True]),
+    ],
+)
+def test_three_readings_in_a_row_make_trouble_and_end_it(readings, troubled):
+    guard = TensionGuard(('a', 'b'), 10.0)
+    told = [guard.update((5.0, reading)) for reading in readings]
+    assert [bool(trouble) for trouble in told] == troubled
+    assert all('b' in trouble for trouble in told if trouble)
+    if max(readings) == 12.0:
+        assert '12.0 N' in told[-1]
+        assert guard.peak == 12.0
+    if math.isnan(readings[0]):
+        assert 'nan' in told[-1]

@@ -119,10 +119,18 @@ def test_the_first_measurement_after_a_gap_teaches_nothing():
     assert drive.controller.learnt == learnt
 
 
-def test_switched_off_the_correction_fades_to_nothing_as_it_moves():
+@pytest.mark.parametrize('tracker', [True, False])
+def test_switched_off_or_without_tracker_it_fades_to_nothing_and_comes_back_without_a_jump(tracker):
     drive = Drive()
-    drive.run(10.0, math.sin)
-    drive.controller.deactivate()
-    _, corrections = drive.run(5.0, math.sin)
-    assert corrections[-1] == 0.0
+    _, learning = drive.run(14.0, math.sin)
+    if tracker:
+        drive.controller.deactivate()
+    _, fading = drive.run(1.7, math.sin, tracker)
+    assert fading[-1] == 0.0
     assert drive.controller.faded
+    assert drive.controller.tracker_fresh(15.7) == tracker
+    drive.controller.activate()
+    _, returning = drive.run(3.0, math.sin)
+    assert np.max(np.abs(returning)) > 0.2
+    joined = np.concatenate([learning[-1:], fading, returning])
+    assert np.max(np.abs(np.diff(joined))) < 0.04

@@ -1,4 +1,3 @@
-import math
 import struct
 
 import pytest
@@ -69,28 +68,16 @@ def given_as(value, key, *path):
     [
         (given_as(1, 'uint'), 'unknown key uint'),
         (given_as(1, 'unti', 'transmitter'), 'transmitter: unknown key unti: did you mean unit'),
-        (given_as(1, 'gain', 'wires', 'left'), 'left: unknown key gain'),
         (given_as({}, 'middle', 'wires'), 'unknown key middle'),
         (without('left', 'wires'), 'left is missing'),
-        (without('faults'), 'faults is missing'),
-        (without('broken_above', 'faults'), 'broken_above is missing'),
-        (without('newton_per_count', 'wires', 'left'), 'newton_per_count is missing'),
         (given_as(-1.0, 'newton_per_count', 'wires', 'left'), 'newton_per_count is -1.0'),
-        (given_as(math.nan, 'zero', 'wires', 'left'), 'zero is nan'),
-        (given_as(True, 'zero', 'wires', 'left'), 'zero is True'),
-        (given_as('int64', 'type', 'wires', 'left'), "type is 'int64'"),
         (given_as(0, 'unit', 'transmitter'), 'unit is 0'),
-        (given_as(3.5, 'unit', 'transmitter'), 'unit is 3.5'),
         (given_as('middle', 'word_order', 'transmitter'), "word_order is 'middle'"),
         (given_as(0.5, 'sign', 'wires', 'left'), 'sign is 0.5'),
-        (given_as(0, 'sign', 'wires', 'left'), 'sign is 0'),
         (given_as(3, 'register', 'wires', 'right'), 'left and right share register 3'),
         (given_as(500, 'register', 'wires', 'right'), 'one Modbus reply carries 125'),
         (given_as(-40000, 'saturated_below', 'faults'), 'broken_below <= saturated_below'),
         (given_as('mark', 'parity', 'transmitter', 'serial'), "parity is 'mark'"),
-        ('wires: [1, 2]\nfaults: {}', r'wires is \[1, 2\]: give a mapping'),
-        ('- 1', r'is \[1\]: give a mapping'),
-        ('{', 'is not YAML'),
     ],
 )
 def test_what_is_wrong_is_named_in_one_line(tmp_path, changed, words):

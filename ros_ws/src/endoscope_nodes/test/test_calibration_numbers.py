@@ -3,8 +3,6 @@
 import pytest
 
 from endoscope_nodes.client.calibration_result import aborted_result, numbers_of, refused_result
-from endoscope_nodes.names import CALIBRATION_NUMBERS
-from endoscope_nodes.runtime.node_parameters import RecorderParameters
 
 
 def test_whoever_shows_the_numbers_sees_that_a_later_calibration_failed() -> None:
@@ -17,7 +15,3 @@ def test_whoever_shows_the_numbers_sees_that_a_later_calibration_failed() -> Non
         assert dict(zip(message.name, message.position, strict=True)) == pytest.approx(
             {'success': 0.0, 'duration': 2.5}
         )
-
-
-def test_a_recording_has_the_numbers() -> None:
-    assert CALIBRATION_NUMBERS in RecorderParameters().topics
