@@ -11,6 +11,7 @@ from contextlib import contextmanager
 import numpy as np
 from operated_graph import OperatedGraph
 from playwright.sync_api import Browser, Page, expect
+from simulated_graph import TICK_RATE
 
 PATIENCE_MS = 60_000
 """For whatever the page is to show: a busy machine shows it late, and that is no fault here."""
@@ -43,7 +44,7 @@ class BrowsedConsole:
     def __init__(self, folder) -> None:
         self.folder = folder
         # What it leaves of a core is the browser's.
-        self.graph = OperatedGraph(folder)
+        self.graph = OperatedGraph(folder, tick_rate=TICK_RATE)
         self._goes_on = True
         self._thread = ThreadPoolExecutor(1)
         self._pacing = self._thread.submit(self._live)

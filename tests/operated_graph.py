@@ -16,7 +16,7 @@ from unittest.mock import patch
 
 import numpy as np
 from sensor_msgs.msg import Joy
-from simulated_graph import TICK_RATE, SimulatedGraph
+from simulated_graph import SimulatedGraph
 
 from endoscope_bringup.cli import main
 from endoscope_nodes.names import JOINTS, MASTER_CLUTCH, MOTOR_COMMAND, MOTORS, SLAVE_COMMAND
@@ -38,6 +38,8 @@ signal.signal(signal.SIGINT, signal.SIG_DFL)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 os.execv(sys.argv[1], sys.argv[1:])
 """
+TICK_RATE = 100
+"""Hz: as many as what a program shows of a graph, and does to it, needs."""
 _STEP_S = 0.02
 _LONGEST_S = 60.0
 _TIMES, _AGAIN_S = 6, 5.0

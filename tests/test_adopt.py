@@ -41,10 +41,10 @@ def error_of_a_motion(graph):
     """Rms error in rad of the tip over a motion that is played from its beginning."""
     tips = graph.tips
     graph.set('master', source='motion', motion='non_periodic')
-    graph.advance(3.0)
+    graph.advance(2.0)
     tips.clear()
     graph.wanted.clear()
-    graph.advance(6.0)
+    graph.advance(4.0)
     graph.set('master', source='none')
     graph.advance(0.6)
     at = [w.stamp_ns for w in graph.wanted]

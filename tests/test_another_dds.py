@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from doc_pages import WORKSPACE, blocks
 from operated_graph import OperatedGraph
+from simulated_graph import TICK_RATE
 
 from endoscope_bags.message_types import TF_MESSAGE, message_type
 from endoscope_core.rig import shipped_rig
@@ -71,7 +72,7 @@ class ForeignParticipant:
 
 @pytest.fixture(scope='module')
 def graph(tmp_path_factory):
-    with OperatedGraph(tmp_path_factory.mktemp('operated'), extra=SHOWING_NODES) as graph:
+    with OperatedGraph(tmp_path_factory.mktemp('operated'), SHOWING_NODES, TICK_RATE) as graph:
         graph.said = {topic: graph.listen(topic, names) for topic, names in STREAMS.items()}
         graph.set('master', source='master')
         graph.enable()

@@ -45,7 +45,7 @@ def graph(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def motion(tmp_path_factory):
-    signal = sequence('there and back', [move(0.0, 0.8, 2.0), move(0.8, 0.0, 2.0), hold(0.2)])
+    signal = sequence('there and back', [move(0.0, 0.6, 1.2), move(0.6, 0.0, 1.2), hold(0.2)])
     ticks = np.arange(0.0, signal.duration, 0.01)
     angle = np.stack([signal(ticks)[0], np.zeros_like(ticks)], axis=1)
     file = tmp_path_factory.mktemp('motion') / 'motion.csv'

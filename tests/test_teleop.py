@@ -12,6 +12,7 @@ import pytest
 import rclpy
 from operated_graph import ENDOSCOPE, OperatedGraph, Typist
 from sensor_msgs.msg import Joy
+from simulated_graph import TICK_RATE
 
 from endoscope_nodes.names import MASTER_CLUTCH
 from endoscope_nodes.runtime.qos import EVENT
@@ -22,7 +23,7 @@ FAR = 0.06
 
 @pytest.fixture(scope='module')
 def running(tmp_path_factory):
-    with OperatedGraph(tmp_path_factory.mktemp('operated')) as graph:
+    with OperatedGraph(tmp_path_factory.mktemp('operated'), tick_rate=TICK_RATE) as graph:
         yield graph
 
 
