@@ -12,7 +12,7 @@ from endoscope_core.safety import TensionGuard
         ([11.0, 11.0, 12.0], [False, False, True]),
         ([20.0, 20.0, 20.0, 9.0, 9.0, 9.0], [False, False, True, True, True, False]),
         ([1.0, 50.0, 50.0] * 9, [False] * 27),
-        ([10.5] * 3 + [9.9, 10.1] * 9, [False, False] + [True] * 19),
+        ([10.5] * 3 + [9.5] * 18, [False, False] + [True] * 19),
         ([math.nan] * 3, [False, False, True]),
     ],
 )
