@@ -96,6 +96,7 @@ def log_of(folder):
     return json.loads((folder / LOG).read_text())
 
 
+@pytest.mark.nightly
 def test_a_second_motion_tells_the_rivals_that_the_first_one_left(record, tmp_path, plant_file):
     rig = SimulatedRig(record, dataclasses.replace(ONE, effects=(BIAS,)))
     out = tmp_path / 'out'

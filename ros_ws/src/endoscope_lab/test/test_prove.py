@@ -2,28 +2,34 @@
 
 import hashlib
 import json
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from endoscope_bringup.cli import main
+from endoscope_core.physics import PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_explain import pipeline
-from endoscope_explain.explanation import Explanation, Verdict
-from endoscope_explain.observe.predicted_signals import fits_by, view
+from endoscope_explain.recording import recording_from_bag
 from endoscope_lab.concealed import motions
 from endoscope_lab.concealed.another_rig import FEW_NODES, FORMS, Laws, drawn_laws, read
+from endoscope_lab.concealed.judge import Statement, judged, law_of_effect
+from endoscope_lab.concealed.readings import as_sensed
 from endoscope_lab.concealed.readings import read as read_of_kernel
 from endoscope_lab.concealed.rigs import described_rig, true_rig
 from endoscope_lab.concealed.strength import moved
-from endoscope_lab.proof import SIMULATORS, SLAVE, proving
+from endoscope_lab.proof import SIMULATORS, SLAVE, sentences
 from endoscope_lab.proof.drawing import drawn
+from endoscope_lab.proof.slave import tracked
 from endoscope_lab.proof.trial import (
+    Answer,
     BrokenSealError,
+    Outcome,
+    Passage,
+    Rig,
     opened,
     seal,
+    write_bag,
 )
 from endoscope_lab.prove_command import SIMULATORS as OFFERED
 
@@ -64,6 +70,17 @@ def test_a_law_is_nothing_at_zero_and_moves_what_is_read_at_one(name, rig):
     assert moved(bare, read(joint, laws(1.0), command, FEW_NODES)) > 1e-3
 
 
+def test_a_recording_comes_back_from_its_bag(rig, tmp_path):
+    plant, command = rig
+    made = as_sensed(read_of_kernel(plant, command), plant.joint_names(), plant.sensors, 1)
+    write_bag(made, tmp_path / 'rig.mcap')
+    again = recording_from_bag(tmp_path / 'rig.mcap', plant)
+    np.testing.assert_allclose(again.command.values, made.command.values)
+    for name, series in made.measured().items():
+        np.testing.assert_array_equal(getattr(again, name).values, series.values)
+        np.testing.assert_allclose(getattr(again, name).time, series.time, atol=1e-9)
+
+
 @pytest.mark.nightly
 @pytest.mark.parametrize('form', SIMULATORS)
 def test_the_same_seed_draws_the_same_rig(form):
@@ -87,40 +104,52 @@ def test_a_seal_is_the_digest_of_its_file_and_breaks_with_it(tmp_path):
         opened(path, told)
 
 
-def proven(folder, capsys):
-    """Lines of a proof, of which the one with the digest of its rig comes first, and its page."""
-    command = f'prove --n 1 --seed 4 --effect load_cell_gain --out {folder}'
+def outcome(laws, said, after=1.0):
+    line = np.zeros(2)
+    answer = Answer(1, 'So.', tuple(said), 9.0, 5.0, after, Passage('s', 'N', line, line, {}), 1.0)
+    rig = Rig(1, None, '', tuple(laws), frozenset(), 0.2)
+    return Outcome(rig, answer, {}, judged(laws, answer.said))
+
+
+def test_what_is_right_and_what_is_not_is_said_in_words():
+    gravity = law_of_effect('gravity', 'bend_x')
+    named = Statement('gravity', 'bend_x', 'joint')
+    stop = Statement('joint_stop', 'bend_x', 'joint')
+    creep = Statement('wire_creep', 'bend_x', 'transmission')
+    told = {
+        'right': outcome([gravity], [named]),
+        'wrong: nothing was concealed': outcome([], [named]),
+        'right, and more is named beside it': outcome([gravity], [named, creep]),
+        'among the names that it cannot tell apart': outcome(
+            [gravity], [replace(creep, rivals=('gravity',))]
+        ),
+        'the right place by another name': outcome([gravity], [stop]),
+        'wrong': outcome([gravity], [creep], after=4.0),
+        'missed': outcome([gravity], []),
+    }
+    for words, one in told.items():
+        assert sentences.result(one) == words
+    assert sentences.why(told['right']) == ''
+    assert '4 times the noise' in sentences.why(told['wrong'])
+    assert '5 times its noise' in sentences.why(told['missed'])
+    assert sentences.headline([told['right'], told['wrong']]).startswith('1 of 2 right')
+
+
+def test_a_proof_from_end_to_end(tmp_path, capsys):
+    out = tmp_path / 'proof'
+    command = f'prove --n 1 --seed 4 --effect load_cell_gain --out {out}'
     assert main(command.split()) == 0
     lines = capsys.readouterr().out.splitlines()
     sealed = next(k for k, line in enumerate(lines) if 'SHA-256' in line)
-    assert sealed < lines.index('The seals are opened:')
-    truth = folder / 'rig_1' / 'sealed.json'
+    told = next(k for k, line in enumerate(lines) if 'load_cell_gain' in line)
+    assert sealed < told < lines.index('The seals are opened:')
+    truth = out / 'rig_1' / 'sealed.json'
     assert lines[sealed].endswith(hashlib.sha256(truth.read_bytes()).hexdigest())
     assert json.loads(truth.read_text())['concealed'] == ['load_cell_gain']
-    page = (folder / 'index.html').read_text()
-    assert lines[sealed].split()[-1] in page
-    assert (folder / 'rig_1' / 'report' / 'report.html').is_file()
-    return lines[sealed:], page
-
-
-def test_a_proof_of_one_who_finds_nothing(tmp_path, capsys, monkeypatch):
-    def finds_nothing(recording, plant, **_):
-        fit = fits_by(view(recording, {'nominal': plant}), 'nominal')
-        found = Explanation.without_fit(Verdict.CONSISTENT, plant)
-        return replace(found, fit=dict.fromkeys(('nominal', 'refitted', 'augmented'), fit))
-
-    monkeypatch.setattr(pipeline, 'explain_recording', finds_nothing)
-    monkeypatch.setattr(proving, 'worker_pool', ThreadPoolExecutor)
-    _, page = proven(tmp_path / 'proof', capsys)
-    assert '0 of 1 right' in page
-
-
-@pytest.mark.nightly
-def test_a_proof_from_end_to_end(tmp_path, capsys):
-    lines, page = proven(tmp_path / 'proof', capsys)
-    told = next(k for k, line in enumerate(lines) if 'load_cell_gain' in line)
-    assert told < lines.index('The seals are opened:')
+    page = (out / 'index.html').read_text()
     assert '1 of 1 right' in page
+    assert lines[sealed].split()[-1] in page
+    assert (out / 'rig_1' / 'report' / 'report.html').is_file()
 
 
 def test_what_cannot_be_concealed_is_named(capsys, tmp_path):
@@ -132,7 +161,7 @@ def test_what_cannot_be_concealed_is_named(capsys, tmp_path):
 
 
 def test_a_slave_has_both_joints_and_nothing_that_spoils_recordings(capsys, tmp_path):
-    for number in (1, 2):
+    for number in range(1, 7):
         case, truth = drawn(SLAVE, 11, number)
         assert case.true.joint_names() == case.described.joint_names() == ('bend_x', 'bend_y')
         assert all(law.stage != 'recording' for law in case.laws)
@@ -143,3 +172,14 @@ def test_a_slave_has_both_joints_and_nothing_that_spoils_recordings(capsys, tmp_
     command = f'prove --rig slave --form other --out {tmp_path / "proof"}'
     assert main(command.split()) == 2
     assert 'mutually exclusive' in capsys.readouterr().err
+
+
+@pytest.mark.nightly
+def test_a_slave_follows_the_inverse_of_its_own_plant(tmp_path):
+    plant = PlantDescription()
+    run = tracked(plant, plant, tmp_path / 'tracked', 3)
+    assert np.ptp(run.desired) > 0.8
+    # The noise of the tracker is 0.25 deg.
+    assert np.rad2deg(run.rmse) < 0.6
+    with_tracking = replace(outcome([], []), tracking={'nominal': run, 'augmented': run})
+    assert 'deg rms under the inverse of the described plant' in sentences.tracking(with_tracking)

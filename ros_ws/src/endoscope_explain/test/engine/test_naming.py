@@ -1,9 +1,8 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from explained_corpus import CORPUS, LAW
 
-from endoscope_core.physics.description import EffectSpec, TermSpec
+from endoscope_core.physics.description import EffectSpec
 from endoscope_core.physics.functions.expression import evaluate
 from endoscope_core.physics.simulator import simulate
 from endoscope_core.rig import shipped_rig
@@ -13,56 +12,16 @@ from endoscope_explain.explanation import Verdict
 OTHER = {'wire_stiffness': 3300.0, 'capstan_exponent': 0.83, 'joint_friction': 8.2e-4}
 
 
-def test_a_rig_like_its_description_is_consistent(one_joint):
-    explanation = explain_recording(
-        one_joint.record(one_joint.rig(), one_joint.motion()), one_joint.rig(), jobs=2
-    )
-    assert explanation.verdict is Verdict.CONSISTENT
-    assert explanation.effects == ()
-    assert explanation.adequate
-
-
-def test_other_parameters_are_found_and_no_effect_is_named(one_joint):
-    explanation = explain_recording(
-        one_joint.record(one_joint.rig(**OTHER), one_joint.motion()), one_joint.rig(), jobs=2
-    )
+def test_other_parameters_are_found_and_no_effect_is_named(corpus):
+    explanation = corpus.case('other_numbers').explanation
     assert explanation.verdict is Verdict.PARAMETERS_DIFFER
     assert explanation.effects == ()
-    for name, value in OTHER.items():
+    for name in ('wire_stiffness', 'capstan_exponent'):
+        value = getattr(CORPUS['other_numbers'].rig.joints['bend_x'], name)
         estimate = explanation.parameters['bend_x'][name]
         assert estimate.value == pytest.approx(value, rel=0.02)
         assert estimate.low <= estimate.value <= estimate.high
         assert estimate.in_band
-
-
-def test_a_number_far_from_its_description_is_no_physics(one_joint):
-    true = one_joint.rig(wire_stiffness=2000.0)
-    explanation = explain_recording(
-        one_joint.record(true, one_joint.motion(4.0)), one_joint.rig(), jobs=2
-    )
-    assert explanation.verdict is Verdict.PARAMETERS_DIFFER
-    assert explanation.effects == ()
-    estimate = explanation.parameters['bend_x']['wire_stiffness']
-    assert estimate.value == pytest.approx(2000.0, rel=0.01)
-    assert not estimate.in_band
-    assert explanation.refitted.joints['bend_x'].wire_stiffness == estimate.value
-    assert max(fit.ratio for fit in explanation.fit['refitted'].values()) < 1.3
-
-
-def test_the_effect_that_was_left_out_is_named(one_joint):
-    true = one_joint.rig(EffectSpec('tracker_delay', 'bend_x', {'delay_s': 0.05}), **OTHER)
-    explanation = explain_recording(
-        one_joint.record(true, one_joint.motion(7.0)), one_joint.rig(), jobs=2
-    )
-    assert explanation.verdict is Verdict.SENSOR_FAULT
-    (named,) = explanation.effects
-    assert named.id == 'tracker_delay'
-    assert named.evidence['margin'] > 10.0
-    assert named.parameters['delay_s'].value == pytest.approx(0.05, rel=0.05)
-    (spec,) = explanation.augmented.effects
-    assert spec.id == 'tracker_delay'
-    worst = max(fit.ratio for fit in explanation.fit['augmented'].values())
-    assert worst < 1.3 < max(fit.ratio for fit in explanation.fit['refitted'].values())
 
 
 def test_an_effect_is_found_beside_a_number_far_from_its_description(one_joint):
@@ -72,26 +31,29 @@ def test_an_effect_is_found_beside_a_number_far_from_its_description(one_joint):
     explanation = explain_recording(
         one_joint.record(true, one_joint.motion(7.0)), one_joint.rig(), jobs=2
     )
+    assert explanation.verdict is Verdict.SENSOR_FAULT
     (named,) = explanation.effects
     assert named.id == 'tracker_delay'
+    assert named.evidence['margin'] > 10.0
     assert named.parameters['delay_s'].value == pytest.approx(0.05, rel=0.05)
     estimate = explanation.parameters['bend_x']['wire_stiffness']
     assert estimate.value == pytest.approx(2000.0, rel=0.02)
+    assert not estimate.in_band
+    (spec,) = explanation.augmented.effects
+    assert spec.id == 'tracker_delay'
+    worst = max(fit.ratio for fit in explanation.fit['augmented'].values())
+    assert worst < 1.3 < max(fit.ratio for fit in explanation.fit['refitted'].values())
     assert explanation.adequate
 
 
-def test_a_law_of_no_known_form_is_a_function_at_its_place(one_joint):
-    law = '0.4*sin(4*q)'
-    true = replace(one_joint.rig(**OTHER), terms=(TermSpec('bend_x', 'exponent_of_angle', law),))
-    explanation = explain_recording(
-        one_joint.record(true, one_joint.motion(7.0)), one_joint.rig(), most_effects=1, jobs=2
-    )
+def test_a_law_of_no_known_form_is_a_function_at_its_place(corpus):
+    true, explanation = CORPUS['unknown'].rig, corpus.case('unknown').explanation
     assert explanation.verdict is Verdict.UNKNOWN_PHYSICS
     unknown = explanation.unknown
     assert unknown.place == 'exponent_of_angle'
     assert unknown.explained > 0.95
     inner = slice(len(unknown.nodes) // 8, -len(unknown.nodes) // 8)
-    expected = evaluate(law, unknown.there.argument.symbol, unknown.nodes[inner])
+    expected = evaluate(LAW.expression, unknown.there.argument.symbol, unknown.nodes[inner])
     assert np.corrcoef(unknown.values[inner], expected)[0, 1] > 0.95
     time = 1e-3 * np.arange(6000)
     other = shipped_rig().joints.gear * (0.9 * np.sin(1.7 * time) + 0.3 * np.sin(4.1 * time))

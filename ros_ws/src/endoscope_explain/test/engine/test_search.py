@@ -34,7 +34,7 @@ from endoscope_explain.search.term import (
 def references(one_joint):
     """Makes the nominal plant, refitted and as described, of a rig with effects and functions."""
 
-    def made(*terms, seconds=12.0):
+    def made(*terms, seconds=7.0):
         known = [term for term in terms if isinstance(term, EffectSpec)]
         functions = tuple(term for term in terms if isinstance(term, TermSpec))
         plant = one_joint.rig()
