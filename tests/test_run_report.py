@@ -1,6 +1,7 @@
 """The plugin that knows what a test file may cost."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -25,7 +26,12 @@ def test_a_file_beyond_its_budget_fails_the_run(tmp_path):
     (tmp_path / 'durations.json').write_text(json.dumps(BUDGETS))
     (tmp_path / 'pytest.ini').write_text('[pytest]\n')
     command = [sys.executable, '-m', 'pytest', '-p', 'run_report', '-q']
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    environment = {k: v for k, v in os.environ.items() if k != 'WRITE_DURATIONS'}
+    done = subprocess.run(
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 6, done.stdout
+    over = tmp_path / '.pytest_cache/v/run_report/over_budget'
+    assert json.loads(over.read_text()) == ['test_over.py']
     [said] = [line for line in done.stdout.splitlines() if 'over its budget' in line]
     assert said.startswith('over its budget: test_over.py took')
