@@ -22,6 +22,8 @@ NOMINAL = {
     'joint_friction': 9e-4,
     'joint_presliding': 0.03,
     'joint_presliding_spread': 0.0,
+    'section_friction': 0.0,
+    'section_straight_angle': 0.0,
     'joint_damping': 1e-5,
     'motor_bandwidth': 30.0,
     'motor_damping_ratio': 0.9,

@@ -19,6 +19,8 @@ BOUNDS = {
     'joint_friction': (0.0, 0.01),
     'joint_presliding': (1e-3, 0.2),
     'joint_presliding_spread': (0.0, 2.0),
+    'section_friction': (0.0, 1.0),
+    'section_straight_angle': (-0.3, 0.3),
     'joint_damping': (0.0, 1e-3),
     'motor_bandwidth': (5.0, 300.0),
     'motor_damping_ratio': (0.3, 3.0),

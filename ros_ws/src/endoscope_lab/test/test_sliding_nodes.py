@@ -200,3 +200,8 @@ def test_reference_answers(name):
     assert np.sqrt(np.mean((at_joint - table[:, 5:7]) ** 2)) < 0.01
     assert np.sqrt(np.mean(off**2)) < 0.01
     assert np.max(np.abs(off)) < 0.03
+
+
+def test_section_friction_is_refused():
+    with pytest.raises(ValueError, match='section_friction'):
+        follow({**NOMINAL, 'section_friction': 0.1}, np.zeros(2), 1e-3, 4)

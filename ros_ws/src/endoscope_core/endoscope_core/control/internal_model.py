@@ -60,6 +60,7 @@ _MOST_TURNS = 12
 _RAMPS, _RAMP_S = (0.1, 0.2), 5.0
 """Speeds of a shaft in rad/s, and how long it turns, which tell the lag of a servo with effects."""
 _ALONE = 'joint'
+SECTION_KEYS = frozenset(('section_friction', 'section_straight_angle'))
 _BEYOND = 10.0
 """Rad to which no joint bends."""
 
@@ -95,15 +96,17 @@ class PhysicalParameters:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> PhysicalParameters:
-        """Parameters from a mapping of exactly their names.
+        """Parameters from a mapping of their names; without section friction there is none.
 
-        ValueError if a name is missing or unknown, or a value is out of range.
+        ValueError if another name is missing, one is unknown, or a value is out of range.
         """
+        # What was written before the plant could have section friction is read as it was meant.
         names = {item.name for item in fields(JointParameters)}
-        if set(values) != names:
-            odd = ', '.join(sorted(set(values) ^ names))
-            raise ValueError(f'parameters of the plant are wrong or missing: {odd}')
-        numbers = {name: float(values[name]) for name in names - {PROFILE}}
+        if odd := (names - SECTION_KEYS) ^ (set(values) - SECTION_KEYS):
+            raise ValueError(
+                f'parameters of the plant are wrong or missing: {", ".join(sorted(odd))}'
+            )
+        numbers = {name: float(value) for name, value in values.items() if name != PROFILE}
         profile = tuple(float(value) for value in values[PROFILE])
         return cls(JointParameters(**numbers, friction_profile=profile))
 

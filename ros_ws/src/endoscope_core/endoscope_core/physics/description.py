@@ -75,7 +75,10 @@ class JointParameters:
     from the motor to a place, whose share along the wire is proportional to
     exp(sum of friction_profile[j] cos((j + 1) pi s)), s from 0 at the motor to 1 at the joint. With
     joint_presliding_spread s the joint has three equal elements with pre-sliding angles qs exp(-s),
-    qs and qs exp(s). The wires are tightened at angle zero, where friction holds the joint.
+    qs and qs exp(s). Of the tension T of the wire on the inside of its bend the section lets
+    T exp(-section_friction abs(q - section_straight_angle)) act where that wire is pulled, and
+    T exp(+...) where it is let go. The wires are tightened at angle zero, where friction holds the
+    joint.
 
     Raises
     ------
@@ -127,6 +130,14 @@ class JointParameters:
     joint_presliding_spread: float = _number(
         0.0, '', 'spread of three such angles, 0 for one',
         0.0, 5.0, Stage.JOINT, spread=0.5,
+    )
+    section_friction: float = _number(
+        0.0, '1/rad', 'capstan friction of the bending section on the wire inside its bend',
+        0.0, 10.0, Stage.JOINT,
+    )
+    section_straight_angle: float = _number(
+        0.0, 'rad', 'angle at which the section is straight and has none of that friction',
+        -math.pi, math.pi, Stage.JOINT, keeper=Keeper.DEVICE,
     )
     joint_damping: float = _number(
         1.0e-5, 'N m s/rad', 'viscous moment of the bending section',

@@ -1,8 +1,8 @@
 """The bending joint: overdamped, with friction that builds up over an angle.
 
 The symbols are those of the plant's equations: angle q, wire tensions Ta(Phi) and Tb(Phi) at the
-joint, joint radius r, stiffness K, damping c, friction tau_f with Dahl state z, moment tau that
-effects add.
+joint, joint radius r, stiffness K, damping c, friction tau_f with Dahl state z, section friction mu
+with the angle qs at which the section is straight, moment tau that effects add.
 """
 
 import math
@@ -26,6 +26,8 @@ from endoscope_core.physics.layout import (
     JOINT_SLIDE,
     JOINT_STEP,
     JOINT_STIFFNESS,
+    SECTION_FRICTION,
+    SECTION_STRAIGHT_ANGLE,
     SLIDING_SPEED,
     WIRE_A,
     WIRE_B,
@@ -45,7 +47,7 @@ _FIRST_STEP = 1e-14
 """Rad: tells only which way the joint turns."""
 
 
-class _Tick(NamedTuple):
+class Tick(NamedTuple):
     """What stays as it is while the joint's balance in a tick is sought."""
 
     k_a: float  # stiffness of each wire, N/m
@@ -91,32 +93,59 @@ def _presliding(p: Array, element: int) -> float:
 
 
 @compiled
-def _friction(x: Array, p: Array, tau_f: float, dq: float) -> tuple[float, float]:
-    """Friction tau_f z in N m against a step of the joint, and its slope."""
+def _slide(x: Array, p: Array, dq: float) -> tuple[float, float]:
+    """State z of the joint's friction after a step of the joint, and its slope."""
     if p[JOINT_PRESLIDING_SPREAD] == 0.0:
-        z, slope = _dahl(x[JOINT_SLIDE], dq, p[JOINT_PRESLIDING])
-        return tau_f * z, tau_f * slope
+        return _dahl(x[JOINT_SLIDE], dq, p[JOINT_PRESLIDING])
     total, steep = 0.0, 0.0
     for i in range(ELEMENTS):
         z, slope = _dahl(x[JOINT_SLIDE + i], dq, _presliding(p, i))
         total += z
         steep += slope
-    return tau_f * total / ELEMENTS, tau_f * steep / ELEMENTS
+    return total / ELEMENTS, steep / ELEMENTS
 
 
 @compiled
-def _imbalance(
-    x: Array, table: Array, p: Array, on: Flags, now: _Tick, dq: float
+def _section_friction(
+    p: Array, q: float, t: float, by_q: float, z: float, by_step: float
+) -> tuple[float, float]:
+    """Moment in N m that the bending section takes from the wire on the inside, and its slope.
+
+    `t` in N is that wire's tension at the joint, `by_q` its slope by the joint's angle; `z` is the
+    state of the joint's friction, `by_step` its slope.
+    """
+    # Capstan friction over hinges that are bent by q - qs in all: T exp(-mu |q - qs|) where the
+    # wire is pulled, T exp(mu |q - qs|) where it is let go (Kaneko et al., IEEE ICRA 1991), z in
+    # between. The inner wire of a positive bend is pulled by a positive step.
+    bend = p[SECTION_FRICTION] * (q - p[SECTION_STRAIGHT_ANGLE])
+    left = math.exp(-bend * z)
+    changes = -left * (p[SECTION_FRICTION] * z + bend * by_step)
+    r = p[JOINT_RADIUS] if bend >= 0.0 else -p[JOINT_RADIUS]
+    return r * t * (1.0 - left), r * (by_q * (1.0 - left) - t * changes)
+
+
+@compiled
+def imbalance(
+    x: Array, table: Array, p: Array, on: Flags, now: Tick, dq: float
 ) -> tuple[float, float]:
     """What is missing in N m to bend by `dq`, and its slope."""
-    # c q' = r (Ta(Phi) - Tb(Phi)) - K (q - q0) - tau_f z + tau, implicit in q at the tick's end.
-    # Viscous drag adds film / 2 times the mean sliding speed of both ends to a wire's end.
+    # c q' = r (Ta(Phi) - Tb(Phi)) - K (q - q0) - tau_f z - tau_s + tau, implicit in q at the tick's
+    # end, tau_s what the section takes. Viscous drag adds film / 2 times the mean sliding speed of
+    # both ends to a wire's end.
     r = p[JOINT_RADIUS]
     q = x[JOINT] + dq
     t_a, slope_a, _, _, _, _ = moved(x, WIRE_A, table, JOINT_END, -now.k_a * r * dq, x[FLOOR])
     t_b, slope_b, _, _, _, _ = moved(x, WIRE_B, table, JOINT_END, now.k_b * r * dq, x[FLOOR])
     tau, slope = added_moment(on, p, x, q, dq, now.q_other, now.time, now.length)
-    friction, steep = _friction(x, p, now.tau_f, dq)
+    z, by_step = _slide(x, p, dq)
+    friction, steep = now.tau_f * z, now.tau_f * by_step
+    if p[SECTION_FRICTION] > 0.0:
+        t, by_q = t_a - x[FLOOR], -now.k_a * r * slope_a
+        if q < p[SECTION_STRAIGHT_ANGLE]:
+            t, by_q = t_b - x[FLOOR], now.k_b * r * slope_b
+        taken, by_angle = _section_friction(p, q, t, by_q, z, by_step)
+        friction += taken
+        steep += by_angle
     c = (p[JOINT_DAMPING] + 0.5 * r * r * now.film) / now.length
     tau += r * (t_a - t_b) - 0.5 * r * now.film * now.w / now.length
     tau -= p[JOINT_STIFFNESS] * (q - p[JOINT_REST_ANGLE]) + friction + c * dq
@@ -125,18 +154,18 @@ def _imbalance(
 
 
 @compiled
-def _step(x: Array, table: Array, p: Array, on: Flags, now: _Tick) -> float:
+def _step(x: Array, table: Array, p: Array, on: Flags, now: Tick) -> float:
     """By how much the joint bends, rad: Newton's method within a bracket."""
     # The nominal imbalance grows with the step and is concave on either side of zero, where fronts
     # and pre-sliding soften it: from the last step Newton's method comes to the root from one side.
-    missing, slope = _imbalance(x, table, p, on, now, 0.0)
+    missing, slope = imbalance(x, table, p, on, now, 0.0)
     if missing == 0.0:
         return 0.0
     side = -1.0 if missing > 0.0 else 1.0
     near, far = 0.0, math.inf
     dq = x[JOINT_STEP] if x[JOINT_STEP] * side > 0.0 else side * _FIRST_STEP
     for _ in range(_TRIES):
-        missing, slope = _imbalance(x, table, p, on, now, dq)
+        missing, slope = imbalance(x, table, p, on, now, dq)
         if missing * side <= 0.0:
             near = abs(dq)
         else:
@@ -172,7 +201,7 @@ def bend(
         x[EXTRA_END_LENGTH] = length
     film = film_drag(on, p, x, abs(x[SLIDING_SPEED]))
     tau_f = p[JOINT_FRICTION] * friction_factor(on, p, x)
-    dq = _step(x, table, p, on, _Tick(k_a, k_b, film, tau_f, w, q_other, time, tick))
+    dq = _step(x, table, p, on, Tick(k_a, k_b, film, tau_f, w, q_other, time, tick))
     if dq != 0.0:
         move(x, WIRE_A, table, JOINT_END, -k_a * r * dq, x[FLOOR])
         move(x, WIRE_B, table, JOINT_END, k_b * r * dq, x[FLOOR])

@@ -96,6 +96,8 @@ def follow(
     plant: Plant, shaft: ArrayLike, tick: float, cells: int, acting: Acting | None = None
 ) -> tuple[Array, Array, Array]:
     """`at_motor, at_joint, angle` as `simulate` gives them, for a shaft whose angle is known."""
+    if plant.get('section_friction'):
+        raise ValueError('section_friction: sliding nodes end where the bending section begins')
     spread = float(plant['joint_presliding_spread'])
     elements = np.exp(spread * np.array([-1.0, 0.0, 1.0])) if spread else np.ones(1)
     grip, springs, tension = _wire(plant, cells)
