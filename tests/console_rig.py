@@ -10,7 +10,7 @@ from contextlib import ExitStack
 
 from console_page import Page
 from node_program import code_of
-from operated_graph import TICK_RATE
+from operated_graph import OPERATED_RATE
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState, Joy
 
@@ -23,7 +23,7 @@ from endoscope_nodes.runtime.streams import JointReader
 from endoscope_nodes.topics import Qos
 
 CONSOLE = [sys.executable, '-m', 'endoscope_bringup.cli', 'console']
-OF_THE_GRAPH = ['--ros-args', '-p', 'source:=master', '-p', f'tick_rate:={TICK_RATE}']
+OF_THE_GRAPH = ['--ros-args', '-p', 'source:=master', '-p', f'tick_rate:={OPERATED_RATE}']
 PATIENCE_S = 240.0
 _QUEUE = profile(Qos(2000, reliable=False))
 

@@ -38,7 +38,7 @@ signal.signal(signal.SIGINT, signal.SIG_DFL)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 os.execv(sys.argv[1], sys.argv[1:])
 """
-TICK_RATE = 100
+OPERATED_RATE = 100
 """Hz: as many as what a program shows of a graph, and does to it, needs."""
 _STEP_S = 0.02
 _LONGEST_S = 60.0
@@ -50,7 +50,7 @@ _DELAY_S, _PERIOD_S, _LONGEST_HOLD_S = 0.4, 1.0 / 30.0, 6.0
 class OperatedGraph(SimulatedGraph):
     """The whole graph, recorder included, no faster than real time while a program is at it."""
 
-    def __init__(self, folder, extra=(), tick_rate=TICK_RATE, **values) -> None:
+    def __init__(self, folder, extra=(), tick_rate=OPERATED_RATE, **values) -> None:
         overrides = {'recorder': {'bag': str(folder / 'bag'), 'autostart': False}}
         overrides |= {
             'calibration': {'motion': 'brief'},

@@ -14,7 +14,7 @@ import pytest
 from console_page import Page
 from console_rig import ConsoleRig, Server, engage, ready
 from diagnostic_msgs.msg import DiagnosticArray
-from operated_graph import TICK_RATE
+from operated_graph import OPERATED_RATE
 from page_frames import encode_input
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Joy
@@ -540,7 +540,7 @@ def test_a_terminated_server_releases_and_gives_back(rig):
 
 def test_a_graph_that_is_begun_records_nothing_unasked(tmp_path):
     environment = os.environ | {'ROS_DOMAIN_ID': str(private_domain())}
-    server = Server(tmp_path, environment, f'--graph=-p tick_rate:={TICK_RATE}')
+    server = Server(tmp_path, environment, f'--graph=-p tick_rate:={OPERATED_RATE}')
     try:
         server.said('ready')
         with Page(server.address, server.token) as page:

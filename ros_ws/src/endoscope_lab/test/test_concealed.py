@@ -1,20 +1,37 @@
 """Rigs with something concealed: how they are drawn, and when what is said of them is right."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
+from endoscope_core.physics import EffectSpec
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
+from endoscope_core.physics.functions.expression import evaluate
+from endoscope_lab.commands import seeds
+from endoscope_lab.concealed import motions
+from endoscope_lab.concealed.forms import DRAWN, drawn_form, drawn_formula, visited
 from endoscope_lab.concealed.judge import Statement, judged, law_at_place, law_of_effect
-from endoscope_lab.concealed.readings import misfit
-from endoscope_lab.concealed.strata import STRATA, drawn_case
+from endoscope_lab.concealed.readings import misfit, read, record
+from endoscope_lab.concealed.rigs import described_rig, true_rig
+from endoscope_lab.concealed.strata import PLACES, STRATA, drawn_case
+from endoscope_lab.concealed.strength import OutOfReachError, left, moved, scaled_to
 
 SEED = 1
 
 
+@pytest.fixture(scope='module')
+def rig():
+    """Described and true rig of two joints, and a command."""
+    draw = np.random.default_rng(SEED)
+    described = described_rig(draw, 2)
+    return described, true_rig(draw, described), motions.another(draw, 2)
+
+
 @pytest.mark.parametrize(
     'stratum',
-    [pytest.param(s, marks=() if s == 'mixed_forms' else pytest.mark.nightly) for s in STRATA],
+    [pytest.param(s, marks=pytest.mark.nightly if s == 'other_simulator' else ()) for s in STRATA],
 )
 def test_every_stratum_draws_the_same_case_for_the_same_seed(stratum):
     first, again = drawn_case(stratum, SEED), drawn_case(stratum, SEED)
@@ -26,10 +43,81 @@ def test_every_stratum_draws_the_same_case_for_the_same_seed(stratum):
     assert bool(first.laws) == (first.moved > 0.0)
 
 
+def test_another_seed_is_another_case():
+    assert drawn_case('nulls', SEED).true != drawn_case('nulls', SEED + 1).true
+
+
 def test_the_rig_itself_predicts_its_second_recording_to_the_noise():
     case = drawn_case('mixed_forms', SEED)
     assert misfit(case.true, case.second, case.described.sensors) < 1.1
     assert misfit(case.described, case.second, case.described.sensors) > 2.0
+
+
+@pytest.mark.parametrize('effect', DRAWN)
+def test_a_formula_of_no_strength_is_no_effect(effect, rig):
+    _, true, command = rig
+    formula = drawn_formula(np.random.default_rng(SEED), effect, 'bend_x', 30.0)
+    with_it = dataclasses.replace(true, effects=(formula(0.0),))
+    assert moved(read(true, command), read(with_it, command)) < 1e-9
+
+
+@pytest.mark.parametrize('aim', [0.03, 0.15])
+@pytest.mark.parametrize('effect', ['gravity', 'joint_stop', 'load_cell_gain'])
+def test_strength_reaches_its_share_of_the_signal(effect, aim, rig):
+    _, true, command = rig
+    formula = drawn_formula(np.random.default_rng(SEED), effect, 'bend_x', 30.0)
+
+    def seen(strength):
+        return read(dataclasses.replace(true, effects=(formula(strength),)), command)
+
+    strength, share = scaled_to(aim, seen)
+    assert share == pytest.approx(aim, rel=0.05)
+    assert moved(read(true, command), seen(strength)) == share
+
+
+def test_a_share_that_no_strength_reaches_is_said(rig):
+    _, true, command = rig
+
+    def seen(strength):
+        bias = EffectSpec('tracker_bias', 'bend_x', {'bias_rad': strength})
+        return read(dataclasses.replace(true, effects=(bias,)), command)
+
+    with pytest.raises(OutOfReachError):
+        scaled_to(100.0, seen)
+
+
+@pytest.mark.parametrize('place', PLACES)
+def test_a_form_can_be_drawn_at_every_place_and_is_no_line(place, rig):
+    _, true, command = rig
+    argument = FUNCTIONS[place].argument
+    low, high = visited(true, command, 'bend_x')[argument]
+    assert low < high
+    form, largest = drawn_form(np.random.default_rng(SEED), place, 'bend_x', (low, high))
+    law = form(0.1 * largest)
+    grid = np.linspace(*law.range, 200)
+    values = evaluate(law.expression, argument.symbol, grid)
+    assert np.sqrt(np.mean(values**2)) == pytest.approx(0.1 * largest, rel=0.05)
+    assert np.corrcoef(grid, values)[0, 1] ** 2 < 0.82
+    other, _ = drawn_form(np.random.default_rng(SEED + 1), place, 'bend_x', (low, high))
+    assert other(1.0).expression != form(1.0).expression
+
+
+def test_what_the_rig_itself_could_do_is_not_left_of_a_law(rig):
+    _, both, command = rig
+    true, command = both.of_joints(['bend_x']), command[:, :1]
+    joint = true.joints['bend_x']
+    stiffer = dataclasses.replace(joint, joint_stiffness=1.02 * joint.joint_stiffness)
+    refitted = dataclasses.replace(true, joints={**true.joints, 'bend_x': stiffer})
+    bias = EffectSpec('tracker_bias', 'bend_x', {'bias_rad': 0.05})
+    biased = dataclasses.replace(true, effects=(bias,))
+    assert left(true, refitted, command) < 0.2
+    assert left(true, biased, command) > 2.0
+
+
+def test_noise_of_a_recording_is_that_of_its_sensors(rig):
+    described, true, command = rig
+    error = record(true, command, SEED).tension.values - read(true, command).tension
+    assert np.std(error) == pytest.approx(described.sensors.load_cell_noise, rel=0.02)
 
 
 def said(*names, rivals=()):
@@ -86,3 +174,8 @@ def test_the_form_of_the_rig_itself_is_no_false_name():
     assert judged([], said('exponent_of_tension'), also).exact
     assert judged([], said('load_independent_friction', 'gravity'), also).false == 1
     assert judged([GRAVITY], said('exponent_of_tension', 'gravity'), also).exact
+
+
+def test_seeds_are_a_range_with_both_ends():
+    assert list(seeds('7')) == [7]
+    assert list(seeds('3-5')) == [3, 4, 5]

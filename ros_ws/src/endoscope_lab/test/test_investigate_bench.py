@@ -6,23 +6,39 @@ import numpy as np
 import pytest
 
 from endoscope_bringup import cli
+from endoscope_core.physics import PlantDescription
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals.command_file import JOINTS, CommandTable
+from endoscope_explain.investigation.motions import Motion, commissioning, require_allowed
 from endoscope_explain.takes import recordings_joined
+from endoscope_lab.concealed.trial import failed
 from endoscope_lab.investigate import (
+    ASKED,
+    COMMISSIONED,
+    FIXED,
     KINDS,
+    Asked,
     SimulatedRig,
     asked,
     drawn_rig,
+    fixed_motion,
+    kind_of,
+    table,
 )
 
 RIG = shipped_rig()
 
 
+def test_one_rig_in_four_has_two_effects_and_two_are_of_the_other_simulator():
+    kinds = [kind_of(seed) for seed in range(1, 5)]
+    assert kinds == ['other_simulator', 'catalogue', 'other_simulator', 'pairs']
+    assert kinds == [kind_of(seed) for seed in range(8001, 8005)]
+
+
 @pytest.mark.parametrize(
     'stratum',
     [
-        pytest.param(s, marks=pytest.mark.nightly if s != 'catalogue' else ())
+        pytest.param(s, marks=pytest.mark.nightly if s == 'other_simulator' else ())
         for s in KINDS.values()
     ],
 )
@@ -62,6 +78,26 @@ def joined_command(recording):
     time = recording.command.time
     ticks = np.arange(0.0, time[-1] + 5e-4, 1e-3)
     return recording.command.values[np.searchsorted(time, ticks + 1e-6, side='right') - 1]
+
+
+@pytest.mark.parametrize('joints', [('bend_x',), ('bend_x', 'bend_y')])
+def test_the_fixed_motion_is_allowed_and_begins_as_the_asked_one(joints):
+    plant = PlantDescription().of_joints(joints)
+    first = commissioning(plant, RIG)
+    longer = fixed_motion(first, 3.0 * first.duration)
+    assert longer.time[-1] == pytest.approx(3.0 * first.duration, abs=1.5)
+    np.testing.assert_array_equal(longer.angle[: len(first.table.time)], first.table.angle)
+    require_allowed(Motion(FIXED, '', '', longer), RIG)
+    moved = np.abs(longer.angle[len(first.table.time) :]).max(axis=0) > 0.1
+    assert moved.tolist() == [joint in joints for joint in longer.joints]
+
+
+def test_a_rig_that_failed_is_wrong_by_every_way():
+    row = vars(failed('pairs', 4, RuntimeError('why')))
+    rows = [Asked(**row, by=by) for by in (COMMISSIONED, ASKED, FIXED)]
+    lines = table(rows).splitlines()
+    assert [line.split(' | ')[0] for line in lines[2:]] == ['| two effects'] * 3 + ['| all'] * 3
+    assert all(' | 0 % | ' in line for line in lines[2:])
 
 
 def test_what_was_not_begun_in_time_is_not_counted(capsys, tmp_path):

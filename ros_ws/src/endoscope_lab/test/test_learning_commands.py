@@ -15,13 +15,17 @@ from endoscope_lab.dataset import load_dataset
 @pytest.fixture(scope='module')
 def data(tmp_path_factory):
     folder = tmp_path_factory.mktemp('learning') / 'data'
-    assert main(['dataset', '--out', str(folder), '--seed', '5', '--n', '7']) == 0
+    assert main(['dataset', '--out', str(folder), '--seed', '5', '--n', '14']) == 0
     return folder
 
 
-def test_a_data_set_says_how_it_was_made_and_does_not_replace_what_is_there(data, capsys):
-    manifest = load_dataset(data).manifest
-    assert (manifest['seed'], manifest['per_class']) == (5, 1)
+def test_the_data_set_says_how_it_was_made(data):
+    dataset = load_dataset(data)
+    assert (dataset.manifest['seed'], dataset.manifest['per_class']) == (5, 2)
+    assert len(dataset.class_deg) == 14
+
+
+def test_a_data_set_does_not_replace_what_is_there(data, capsys):
     assert main(['dataset', '--out', str(data)]) == 2
     assert 'is not empty' in capsys.readouterr().err
 

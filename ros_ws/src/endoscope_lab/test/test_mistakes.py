@@ -13,7 +13,16 @@ from endoscope_explain.pipeline import Inputs, Sources, explain_case
 from endoscope_lab.mistakes import drawing
 from endoscope_lab.mistakes.mistake import MISTAKES, is_said
 
-SHOWN = ('motors', 'tensions negative', 'all stamps in us', 'shaft in deg')
+SHOWN = (
+    'tracker',
+    'motors',
+    'tensions negative',
+    'all stamps in us',
+    'command in mm of wire',
+    'wires of two joints',
+    'shaft in deg',
+    'tension in kg',
+)
 """One mistake of each kind that is tried for every change: a place, a sign, a clock, a unit."""
 LIKEST = ('tracker_bias', 'load_cell_gain', 'load_cell_delay', 'rate_limit', 'cross_coupling')
 """Physics that is most like a mistake."""

@@ -10,6 +10,7 @@ torch = pytest.importorskip('torch', reason='PyTorch is missing: make -C ros_ws 
 from endoscope_lab.papers.networks import (  # noqa: E402
     TrainingSettings,
     cross_validate,
+    grouped_folds,
     predict,
     train_network,
     use_one_thread,
@@ -45,6 +46,16 @@ def easy():
     )
 
 
+def test_table_2_reduces_a_recording_to_one_feature_vector():
+    network = TensionCnn(7).eval()
+    convolutions = [m for m in network.modules() if isinstance(m, torch.nn.Conv1d)]
+    assert [(c.kernel_size, c.stride) for c in convolutions] == [((3,), (3,))] * 8
+    assert network.features(torch.zeros(1, 4, 9000)).shape == (1, 64, 1)
+    names = [type(m).__name__ for m in network.features]
+    assert names == ['Conv1d', 'BatchNorm1d', 'ReLU'] * 8
+    assert isinstance(network.dense, torch.nn.Linear)
+
+
 def test_training_learns_and_repeats_with_its_seed(easy):
     first = train_network(easy.tension, easy.class_deg, 1, SHORT)
     again = train_network(easy.tension, easy.class_deg, 1, SHORT)
@@ -68,3 +79,9 @@ def test_folds_never_split_a_configuration(easy, monkeypatch):
         rows = [k for k, t in enumerate(easy.tension) if any(np.array_equal(t, x) for x in tension)]
         inside = set(easy.configuration[rows].tolist())
         assert all(np.sum(easy.configuration[rows] == c) == 2 for c in inside)
+
+
+def test_folds_keep_a_configuration_on_one_side(easy):
+    for train, test in grouped_folds(easy, 0, 2):
+        assert not set(easy.configuration[train]) & set(easy.configuration[test])
+        assert len(train) + len(test) == len(easy.class_deg)

@@ -9,7 +9,8 @@ from endoscope_core.physics.simulator import simulate
 from endoscope_core.rig import shipped_rig
 from endoscope_lab.papers.real_recordings import recordings_folder
 from endoscope_lab.real.rig import PLANT, Plant, Told, as_described, wide
-from endoscope_lab.real.takes import KGF, Take, read, require_recordings
+from endoscope_lab.real.tables import rmse_rows
+from endoscope_lab.real.takes import KGF, Take, between_cycles, read, require_recordings
 
 FOLDER = recordings_folder()
 recorded = needs(REAL)
@@ -50,6 +51,22 @@ def test_a_refit_finds_a_number_that_was_changed(simulated):
     start[k] += 0.1
     found = Plant(model, start).refitted()
     assert found.model.free[k].value(found.theta[k]) == pytest.approx(8e-4, rel=0.02)
+
+
+def test_cycles_of_one_motion_are_alike_and_others_are_not_compared(simulated):
+    angle, *tensions = between_cycles(simulated)
+    assert np.rad2deg(angle) < 0.05
+    assert max(tensions) < 0.02
+    other = Take(**{**vars(simulated), 'cycle_s': 3.0})
+    assert np.isnan(between_cycles(other)).all()
+
+
+def test_a_row_says_what_each_plant_leaves(simulated):
+    model = wide(simulated.observation())
+    plants = dict.fromkeys(('nominal', 'refitted', 'augmented'), Plant(model, as_described(model)))
+    [row] = rmse_rows([Told(simulated, 0.0, plants)])
+    assert row[0] == 'simulated'
+    assert row[1].startswith('0.0')
 
 
 def test_a_folder_without_recordings_is_refused_by_name(tmp_path):

@@ -45,3 +45,13 @@ def test_a_closed_cycle_says_that_loops_close():
     assert recording.scored[: driver.size].all()
     fit = fit_model([recording], 0, 'dahl')
     np.testing.assert_allclose(fit.predict(np.tile(driver, 2))[: driver.size], actual, atol=0.003)
+
+
+def test_a_sum_of_plays_is_found_again():
+    driver = 1.5 * np.sin(np.arange(0.0, 9.0, 0.02))
+    state, actual = 0.0, []
+    for angle in driver:
+        state = min(max(state, angle - 0.45), angle + 0.45)
+        actual.append(0.1 * angle + 0.7 * state + 0.02)
+    recording = closed_cycle(driver, np.array(actual))
+    np.testing.assert_allclose(fitted(recording, driver), actual, atol=0.002)

@@ -74,6 +74,32 @@ def test_a_wire_comes_back_to_where_it_turned(steps):
     )
 
 
+def test_a_wire_without_friction_is_a_spring():
+    smooth = {**NOMINAL, 'capstan_exponent': 1e-9}
+    tension = pulled(smooth, 0.0, 0.2e-3, joint=np.array([0.0, -0.1e-3]))
+    np.testing.assert_allclose(tension, 5.0 + STIFFNESS * 0.3e-3, atol=1e-6)
+
+
+@pytest.mark.parametrize('direction', [1.0, -1.0])
+def test_a_wire_that_slides_as_a_whole_holds_the_capstan_s_ratio(direction):
+    way = direction * np.array([0.0, 3e-3])
+    tension = pulled(EVEN, *way, joint=way)
+    np.testing.assert_allclose(
+        tension, tension[0] * np.exp(-direction * EXPONENT * PLACE), rtol=1e-9
+    )
+    # Moved as a whole, it is as long as it was.
+    assert np.trapezoid(tension, PLACE) == pytest.approx(5.0, abs=1e-9)
+
+
+def test_a_wire_pulled_at_both_ends_keeps_a_still_point():
+    way = np.array([0.0, 2e-3])
+    tension = pulled(EVEN, *way, joint=-way)
+    np.testing.assert_allclose(tension, tension[::-1], rtol=1e-9)
+    from_middle = np.abs(PLACE - 0.5) - 0.5
+    np.testing.assert_allclose(tension, tension[0] * np.exp(EXPONENT * from_middle), rtol=1e-9)
+    assert np.trapezoid(tension, PLACE) == pytest.approx(5.0 + STIFFNESS * 4e-3, abs=1e-8)
+
+
 def test_a_slack_wire_picks_up_by_its_length():
     spare = 5.0 / STIFFNESS
     motor = np.array([0.0, -spare - 1e-3, -spare - 1e-3, -spare - 0.6e-3, -spare])
@@ -164,6 +190,24 @@ def test_the_joint_comes_to_rest_where_its_torques_balance(spread):
     torque = 0.0008 * (at_joint[-1, 0] - at_joint[-1, 1])
     assert torque == pytest.approx(0.0045 * (angle[-1] - 0.02) + friction, abs=1e-8)
     assert at_motor[-1, 0] > at_joint[-1, 0]
+
+
+def test_without_friction_the_joint_is_a_spring_between_springs():
+    plant = {**NOMINAL, 'capstan_exponent': 1e-9, 'joint_friction': 0.0}
+    shaft = np.concatenate([[0.0], np.full(300, 0.3)])
+    *_, angle = follow(plant, shaft, 1e-3, 10)
+    pull, bend = 2.0 * 3000.0 * 0.0008 * 0.0024, 0.0045 + 2.0 * 3000.0 * 0.0008**2
+    assert angle[-1] == pytest.approx(pull * 0.3 / bend, abs=1e-8)
+
+
+def test_the_two_wires_are_each_other_s_mirror():
+    command = 0.7 * np.sin(np.arange(400) * 0.02)
+    shaft, at_motor, at_joint, angle = simulate(NOMINAL, command, 1e-3, 20)
+    turned = simulate(NOMINAL, -command, 1e-3, 20)
+    for own, other in zip(
+        (-shaft, at_motor[:, ::-1], at_joint[:, ::-1], -angle), turned, strict=True
+    ):
+        np.testing.assert_allclose(own, other, atol=1e-7)
 
 
 @needs(REFERENCE)

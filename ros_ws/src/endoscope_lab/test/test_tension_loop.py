@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from outside_data import REAL, needs
 
 from endoscope_core.metrics import width_at_mid_height
@@ -7,6 +8,14 @@ from endoscope_core.signals import calibration_motion
 from endoscope_lab.dataset import random_instrument
 from endoscope_lab.dataset.rig_variation import backlash_sizes, calibration_command, in_tube
 from endoscope_lab.papers.real_recordings import leave_one_out_errors, tension_loop_width
+
+
+def test_a_loop_of_known_width():
+    phase = np.linspace(0.0, 2.0 * np.pi, 2001)
+    lead = 0.3
+    pull = np.sin(phase + lead)
+    width = tension_loop_width(60.0 * np.sin(phase), 5.0 + pull, 5.0 - pull)
+    assert width == pytest.approx(120.0 * np.sin(lead), abs=0.05)
 
 
 def test_on_the_simulated_rig_much_friction_makes_it_narrower():
@@ -22,6 +31,13 @@ def test_on_the_simulated_rig_much_friction_makes_it_narrower():
         widths.append(tension_loop_width(desired, *tension.T))
     assert np.all(np.diff(sizes) > 0.0)
     assert np.all(np.diff(widths) < 0.0)
+
+
+def test_leaving_a_point_out_predicts_it_from_the_others():
+    np.testing.assert_allclose(
+        leave_one_out_errors([0.0, 1.0, 2.0, 3.0], [1.0, 3.0, 5.0, 7.0]), 0.0, atol=1e-12
+    )
+    assert leave_one_out_errors([0.0, 1.0, 2.0], [0.0, 1.0, 5.0])[2] == pytest.approx(-3.0)
 
 
 @needs(REAL)

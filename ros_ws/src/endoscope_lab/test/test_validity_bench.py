@@ -1,11 +1,39 @@
 """What hours of work make of a rig, and whether it is told."""
 
+import pytest
+
 from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_lab.papers.tracking_trial import calibrate, never_seen_tube
 from endoscope_lab.validity import (
+    CAUSES,
+    HOURS,
+    Row,
     Slow,
+    creeping,
     is_told,
+    plant_after,
+    table,
 )
+
+
+@pytest.mark.parametrize('cause', CAUSES)
+def test_a_rig_begins_as_it_was_calibrated(cause):
+    assert CAUSES[cause](0.0) == Slow()
+    assert CAUSES[cause](HOURS[-1]) != Slow()
+
+
+def test_wires_that_are_tightened_again_creep_again():
+    assert creeping(2.0).lost == pytest.approx(1.6)
+    assert creeping(2.01).lost < 0.2 < creeping(2.5).lost < creeping(4.0).lost
+
+
+def test_what_has_become_of_a_rig_is_a_plant():
+    tube = never_seen_tube(1, 0)
+    now = plant_after(tube.plant, Slow(lost=1.0, factor=1.5, moment=1e-3))
+    for name, joint in tube.plant.joints.items():
+        assert now.joints[name].pretension == pytest.approx(joint.pretension - 1.0)
+        assert now.joints[name].capstan_exponent == pytest.approx(1.5 * joint.capstan_exponent)
+    assert [effect.id for effect in now.effects] == ['external_load'] * len(now.joints)
 
 
 def test_a_tube_that_is_bent_anew_is_told_and_one_that_stays_is_not():
@@ -14,3 +42,8 @@ def test_a_tube_that_is_bent_anew_is_told_and_one_that_stays_is_not():
     assert first.plants
     assert is_told(tube, Slow(factor=1.6), first, 1)
     assert not is_told(tube, Slow(), first, 1)
+
+
+def test_the_table_has_a_line_for_each_time():
+    rows = [Row('run-in', 1, hour, 60, 61.0, (9.0,) * 5, False) for hour in HOURS]
+    assert len(table(rows, ['run-in']).splitlines()) == len(HOURS) + 2

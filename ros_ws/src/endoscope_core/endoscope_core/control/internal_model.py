@@ -60,7 +60,7 @@ _MOST_TURNS = 12
 _RAMPS, _RAMP_S = (0.1, 0.2), 5.0
 """Speeds of a shaft in rad/s, and how long it turns, which tell the lag of a servo with effects."""
 _ALONE = 'joint'
-SECTION_KEYS = frozenset(('section_friction', 'section_straight_angle'))
+_SECTION_KEYS = frozenset(('section_friction', 'section_straight_angle'))
 _BEYOND = 10.0
 """Rad to which no joint bends."""
 
@@ -102,7 +102,7 @@ class PhysicalParameters:
         """
         # What was written before the plant could have section friction is read as it was meant.
         names = {item.name for item in fields(JointParameters)}
-        if odd := (names - SECTION_KEYS) ^ (set(values) - SECTION_KEYS):
+        if odd := (names - _SECTION_KEYS) ^ (set(values) - _SECTION_KEYS):
             raise ValueError(
                 f'parameters of the plant are wrong or missing: {", ".join(sorted(odd))}'
             )
