@@ -98,6 +98,17 @@ def test_messages_out_of_order_are_sorted_by_stamp_unless_asked_otherwise(tmp_pa
     assert bag.joint_state('x', order='recorded').position[:, 0].tolist() == [3, 1, 2]
 
 
+def test_joints_that_change_places_in_the_middle(tmp_path):
+    with BagWriter(tmp_path / 'bag') as writer:
+        for k in range(10):
+            names = ['a', 'b'] if k < 5 else ['b', 'a']
+            values = [k, -k] if k < 5 else [-k, k]
+            cdr = encode_joint_state(names, k, position=values)
+            writer.write_raw('/x', JOINT_STATE, cdr, k)
+    series = open_bag(tmp_path / 'bag').joint_state('x')
+    np.testing.assert_array_equal(series.position, [[k, -k] for k in range(10)])
+
+
 def test_a_joint_that_is_not_there_is_named(tmp_path):
     series = open_bag(write(tmp_path / 'bag', n=1)).joint_state('motor/measured_js')
     with pytest.raises(BagError, match='no joint motor_z; it has motor_y, motor_x'):
@@ -287,6 +298,13 @@ def test_every_cut_is_noticed(tmp_path):
             open_bag(cut)
 
 
+def test_zeros_after_a_crash_of_the_machine_are_a_cut(tmp_path):
+    whole = write(tmp_path / 'bag.mcap').read_bytes()
+    (tmp_path / 'zeros.mcap').write_bytes(whole[: len(whole) // 2] + bytes(1000))
+    with pytest.raises(BagError, match=r'zeros\.mcap'):
+        open_bag(tmp_path / 'zeros.mcap')
+
+
 def test_a_flipped_bit_is_noticed(tmp_path):
     path = write(tmp_path / 'bag.mcap')
     data = bytearray(path.read_bytes())
@@ -330,21 +348,3 @@ def test_a_topic_without_a_message_is_said_to_be_empty(tmp_path):
         ': no message was recorded on /a/motor/servo_jp; '
         'lacks topic slave/servo_jp; it has /a/wires/measured_js'
     )
-
-
-def test_joints_that_change_places_in_the_middle(tmp_path):
-    with BagWriter(tmp_path / 'bag') as writer:
-        for k in range(10):
-            names = ['a', 'b'] if k < 5 else ['b', 'a']
-            values = [k, -k] if k < 5 else [-k, k]
-            cdr = encode_joint_state(names, k, position=values)
-            writer.write_raw('/x', JOINT_STATE, cdr, k)
-    series = open_bag(tmp_path / 'bag').joint_state('x')
-    np.testing.assert_array_equal(series.position, [[k, -k] for k in range(10)])
-
-
-def test_zeros_after_a_crash_of_the_machine_are_a_cut(tmp_path):
-    whole = write(tmp_path / 'bag.mcap').read_bytes()
-    (tmp_path / 'zeros.mcap').write_bytes(whole[: len(whole) // 2] + bytes(1000))
-    with pytest.raises(BagError, match=r'zeros\.mcap'):
-        open_bag(tmp_path / 'zeros.mcap')

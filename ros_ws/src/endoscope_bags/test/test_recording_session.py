@@ -10,6 +10,7 @@ import pytest
 from endoscope_bags import open_bag
 from endoscope_bags.bag_writer import CHUNK_SECONDS
 from endoscope_bags.cdr_encoding import encode_joint_states, encode_string
+from endoscope_bags.errors import BagExistsError
 from endoscope_bags.information import bag_information
 from endoscope_bags.message_types import JOINT_STATE, STRING
 from endoscope_bags.recording_session import Arrival, RecordingSession, simulated_receipt_ns
@@ -66,6 +67,12 @@ def test_what_waits_too_long_is_handed_over(tmp_path):
     session.close()
 
 
+def test_an_existing_recording_is_refused(tmp_path):
+    RecordingSession(tmp_path / 'bag').close()
+    with pytest.raises(BagExistsError):
+        RecordingSession(tmp_path / 'bag')
+
+
 def test_closing_twice_gives_the_same_report(tmp_path):
     session = RecordingSession(tmp_path / 'bag')
     session.accept(arrivals(session.add_topic('/a', STRING), range(10)))
@@ -109,9 +116,8 @@ def fill(path, limit, threaded, count):
 
 # A writing thread has up to 16 chunks, of 250 messages here, before it: it finds the disk full on
 # closing in the short recording, and while it is made in the long one.
-@pytest.mark.parametrize(
-    ('threaded', 'count'), [('threaded', 4000), ('threaded', 8000), ('inline', 4000)]
-)
+@pytest.mark.parametrize('count', [4000, 8000])
+@pytest.mark.parametrize('threaded', ['threaded', 'inline'])
 def test_a_full_disk_keeps_what_is_there_and_is_said(tmp_path, threaded, count):
     recorded, lost, complete, finished, text = fill(tmp_path / 'bag', 700_000, threaded, count)
     assert recorded + lost == count
@@ -122,6 +128,11 @@ def test_a_full_disk_keeps_what_is_there_and_is_said(tmp_path, threaded, count):
     assert bag.message_count == recorded
     np.testing.assert_array_equal(bag.times('/a').log_ns, np.arange(recorded) * MS)
     assert 'File too large' in bag_information(bag).notes['ended']
+
+
+def test_the_limit_is_what_stopped_it(tmp_path):
+    recorded, lost, complete, *_ = fill(tmp_path / 'bag', 0, 'threaded', 4000)
+    assert (recorded, lost, complete) == (4000, 0, 'True')
 
 
 def test_no_room_at_all_is_an_error_that_leaves_nothing(tmp_path):

@@ -11,9 +11,12 @@ from pathlib import Path
 import pytest
 
 from endoscope_bringup import cli
+from endoscope_bringup.commands import COMMANDS
 from endoscope_bringup.subcommands import OneLineParser
 from endoscope_core.atomic_output import atomic_file, write_text
 from endoscope_core.errors import EndoscopeError
+
+HEAVY_MODULES = {'torch', 'rclpy', 'numba', 'scipy', 'matplotlib'}
 
 
 def _parser_running(action: Callable[[argparse.Namespace], int]) -> Callable[[], OneLineParser]:
@@ -37,6 +40,14 @@ def test_wrong_usage_is_one_line_and_exit_2(
     assert err.startswith('endoscope')
     assert '--help' in err
     assert err.count('\n') == 1
+
+
+@pytest.mark.parametrize('command', COMMANDS)
+def test_every_command_has_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        cli.main([command.rstrip('_').replace('_', '-'), '--help'])
+    assert stop.value.code == 0
+    assert 'usage: endoscope' in capsys.readouterr().out
 
 
 def test_unusable_input_is_one_line_and_exit_2(
@@ -140,11 +151,27 @@ def test_signal_gives_its_status_and_leaves_no_output(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_help_imports_nothing_heavy() -> None:
+    program = (
+        'import sys\n'
+        'from endoscope_bringup.cli import build_parser\n'
+        'build_parser()\n'
+        f'print(*sorted(set(sys.modules) & {HEAVY_MODULES!r}))\n'
+    )
+    done = subprocess.run(
+        [sys.executable, '-c', program], capture_output=True, text=True, check=False
+    )
+    assert done.stderr == ''
+    assert done.stdout.strip() == ''
+
+
 @pytest.mark.parametrize(
     'program',
     [
+        'from endoscope_bringup.cli import main; main(["--help"])',
         'from endoscope_bringup.cli import main; main(["effects"])',
         'from endoscope_nodes.program import simulation_clock; simulation_clock(["--help"])',
+        'from endoscope_nodes.healthcheck import main; main(["--help"])',
     ],
 )
 def test_a_reader_that_goes_away_or_has_no_room_gets_no_traceback(

@@ -28,6 +28,7 @@ from endoscope_bringup.demo.procedure import (
     Segment,
 )
 from endoscope_bringup.demo.results import (
+    BACKLASH,
     LARGEST,
     RMSE,
     CalibrationOutcome,
@@ -116,11 +117,53 @@ def test_the_page_is_drawn_without_a_complaint(page):
     assert complaints == []
 
 
+def test_headings_alone_tell_what_was_wrong_and_what_became_better(page, results):
+    headings = re.findall(r'<h[12]>(.*?)</h[12]>', page)
+    rows = table_rows(results)
+    widest = max(row.values[Method.NONE] for row in of_figure(rows, BACKLASH))
+    assert f'{widest:.0f}° wide' in headings[0]
+    assert 'physical inverse leaves' in headings[0]
+    assert [heading.split(':')[0] for heading in headings[1:]] == [
+        'What is wrong',
+        'What helps',
+        'What is left',
+        'How it was measured',
+        *(f'{tube.name.capitalize()}, in detail' for tube in TUBES),
+        'How this was made',
+    ]
+
+
+def test_every_picture_has_a_caption_and_every_method_one_name(page, results):
+    # The endoscope; loops, tracking of each motion and a calibration for each tube.
+    assert (
+        page.count('<figure') == page.count('<figcaption>') == 1 + len(TUBES) * (2 + len(MOTIONS))
+    )
+    assert page.count('<figure class="plots">') == len(TUBES) * (2 + len(MOTIONS))
+    terminal = ' '.join(figures_table(table_rows(results)).split())
+    for method in Method:
+        assert f'</span>{method}</th>' in page
+        assert method.split()[0] in terminal
+    for wire in ('wire_x_pos', 'wire_x_neg', 'wire_y_pos', 'wire_y_neg'):
+        # In the legend, and in the table of the numbers.
+        assert page.count(f'>{wire}<') == 2 * len(TUBES)
+    for text in ('61234', '2026-11-21 08:00 UTC', '10.5 s'):
+        assert text in page
+
+
 def test_the_best_method_comes_first_by_its_numbers():
     rows = table_rows(results_of(LAG | {Method.INVERSE: 0.2}))
     assert ranking(rows) == [Method.BOUC_WEN, Method.INVERSE, Method.NONE]
     assert all(row.is_best(m) == (m is Method.BOUC_WEN) for row in rows for m in Method)
     assert figures_table(rows).count('*') == len(rows)
+
+
+def test_the_best_of_a_row_is_marked_on_the_page(page, results):
+    marked = re.findall(r'<td class="best">([\d.]+)', page)
+    rows = table_rows(results)
+    assert marked == [
+        f'{row.values[m]:.2f}' for row in rows for m in ranking(rows) if row.is_best(m)
+    ]
+    assert len(marked) >= len(rows)
 
 
 def test_one_row_in_which_another_method_is_best_is_marked_so(results):
@@ -275,14 +318,10 @@ def test_a_first_line_is_said_before_anything_slow_is_loaded(tmp_path):
     assert 'torch' not in then
 
 
+def test_a_run_that_was_not_made_is_named(results):
+    with pytest.raises(KeyError, match='sigmoid colon'):
+        results.run('sigmoid colon', MOTIONS[0], Method.NONE)
+
+
 def test_the_documentation_shows_the_drawing_that_the_page_has():
     assert (ROOT / 'ros_ws/doc/endoscope.svg').read_text() == endoscope_picture()
-
-
-def test_the_best_of_a_row_is_marked_on_the_page(page, results):
-    marked = re.findall(r'<td class="best">([\d.]+)', page)
-    rows = table_rows(results)
-    assert marked == [
-        f'{row.values[m]:.2f}' for row in rows for m in ranking(rows) if row.is_best(m)
-    ]
-    assert len(marked) >= len(rows)

@@ -104,14 +104,7 @@ def write_bag(folder, streams):
     return folder
 
 
-@pytest.mark.parametrize(
-    'driver',
-    [
-        'slave/servo_jp',
-        pytest.param('motor/servo_jp', marks=pytest.mark.nightly),
-        pytest.param('motor/measured_js', marks=pytest.mark.nightly),
-    ],
-)
+@pytest.mark.parametrize('driver', ['motor/measured_js', 'motor/servo_jp', 'slave/servo_jp'])
 def test_identifying_a_bag_finds_the_width_of_its_loop(calibration, tmp_path, driver, capsys):
     stamps, angle, trajectory = calibration
     bending = trajectory.bending[::25, :1]

@@ -193,6 +193,18 @@ def test_commands_in_degrees_are_known_by_the_reach_of_the_rig(plant_file, tmp_p
     assert not (tmp_path / 'out').exists()
 
 
+def test_a_command_that_is_not_a_number_is_refused(plant_file, tmp_path, capsys):
+    shaft = SHAFT.copy()
+    shaft[700, 0] = np.nan
+    with BagWriter(tmp_path / 'broken') as writer:
+        writer.write_streams(
+            [stream('motor/servo_jp', ['motor_x', 'motor_y'], STAMPS, position=shaft)]
+        )
+    assert run(plant_file, tmp_path / 'broken', tmp_path / 'answer') == 2
+    assert 'nan' in capsys.readouterr().err
+    assert not (tmp_path / 'answer').exists()
+
+
 @pytest.mark.parametrize('late', [0, 1])
 def test_the_answer_is_stamped_as_the_recording_stamps_its_readings(plant_file, tmp_path, late):
     truth = simulate(PlantDescription(), SHAFT)

@@ -1,5 +1,6 @@
 """Help, version and completion cost next to nothing: nothing heavy is loaded for them."""
 
+import importlib.metadata
 import os
 import re
 import subprocess
@@ -11,7 +12,7 @@ from endoscope_bringup import cli
 from endoscope_bringup.commands import COMMANDS
 from endoscope_bringup.subcommands import GROUP, commands_of_other_packages
 
-HEAVY = ('numpy', 'scipy', 'numba', 'rclpy', 'matplotlib', 'mcap', 'torch')
+HEAVY = ('numpy', 'scipy', 'numba', 'rclpy', 'matplotlib', 'mcap')
 CODE = """
 import sys
 from endoscope_bringup.cli import main
@@ -120,6 +121,13 @@ def test_a_package_that_is_installed_adds_its_command(kitchen):
     assert 'brew' not in start('--help').stdout
 
 
+def test_commands_are_those_that_python_finds(kitchen, monkeypatch):
+    monkeypatch.syspath_prepend(kitchen)
+    entries = importlib.metadata.entry_points(group=GROUP)
+    assert commands_of_other_packages() == {entry.name: entry.value for entry in entries}
+    assert commands_of_other_packages()['brew'] == 'kitchen_brew'
+
+
 def test_without_the_lab_there_is_no_bench_and_one_line_says_so(monkeypatch, capsys):
     monkeypatch.setattr(cli, 'commands_of_other_packages', dict)
     with pytest.raises(SystemExit) as stop:
@@ -131,9 +139,14 @@ def test_without_the_lab_there_is_no_bench_and_one_line_says_so(monkeypatch, cap
     assert 'bench' not in cli.build_parser().format_help()
 
 
+@pytest.mark.parametrize('shell', ['bash', 'zsh', 'tcsh'])
+def test_a_shell_completes_every_command(shell):
+    script = start('completion', shell).stdout
+    assert all(name.rstrip('_').replace('_', '-') in script for name in COMMANDS)
+
+
 def test_bash_completes_a_command():
     script = start('completion', 'bash').stdout
-    assert all(name.rstrip('_').replace('_', '-') in script for name in COMMANDS)
     typed = 'COMP_WORDS=(endoscope tele); COMP_CWORD=1; _shtab_endoscope; echo "${COMPREPLY[@]}"'
     shown = subprocess.run(
         ['bash', '-c', f'{script}\n{typed}'], capture_output=True, text=True, check=False

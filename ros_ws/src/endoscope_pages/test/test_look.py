@@ -47,6 +47,11 @@ def test_uplot_is_the_published_one_and_its_licence_comes_with_it() -> None:
     assert 'MIT' in (ASSETS / 'LICENSE.uPlot').read_text(encoding='utf-8')
 
 
+def test_the_light_look_has_every_colour_of_the_dark_one() -> None:
+    colours = schemes()
+    assert colours['dark'].keys() == colours['light'].keys()
+
+
 @pytest.mark.parametrize('scheme', ['dark', 'light'])
 def test_words_and_curves_stand_out_from_what_is_behind_them(scheme: str) -> None:
     colours = schemes()[scheme]
