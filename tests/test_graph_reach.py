@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from commanded_graph import Sender
 from simulated_graph import TICK_RATE, SimulatedGraph
-from tubes import tube_of_size
+from tubes import slave_of, tube_of_size
 
 from endoscope_core.control import MotorLimits, bending_range
 from endoscope_core.identification.law_choice import CalibrationFindings
@@ -35,14 +35,24 @@ def warnings(graph, name):
 
 
 def test_a_calibration_finds_the_reach_and_the_master_keeps_to_it(tmp_path):
-    """In a tube so tight that 60 deg are more than it allows, by motors that turn less far."""
+    """In a tube so tight that 60 deg are more than it allows, by motors that turn less far.
+
+    Their gear is another than the shipped rig's, by smaller pulleys.
+    """
     overrides = tube_of_size(tmp_path, 80, 1080)
     plant = load_plant(overrides['motor_driver']['plant_file'])
-    overrides |= {'calibration': {'motion': 'brief'}}
-    rig = rig_of(drive=1.9)
+    rig = rig_of(drive=1.9, gear=0.6)
+    share = shipped_rig().joints.gear / rig.joints.gear
+    joints = {
+        name: dataclasses.replace(joint, pulley_radius=share * joint.pulley_radius)
+        for name, joint in plant.joints.items()
+    }
+    plant = dataclasses.replace(plant, joints=joints)
+    overrides = slave_of(plant, tmp_path / 'geared.yaml') | {'calibration': {'motion': 'brief'}}
     with SimulatedGraph(overrides=overrides, rig=rig) as graph:
         graph.enable()
         values = graph.calibrate()
+        assert values['class_deg'] == '80'
         found = [
             [float(values[f'reach.{joint}.{end}']) for end in ('low', 'high')] for joint in JOINTS
         ]

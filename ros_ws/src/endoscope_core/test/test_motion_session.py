@@ -329,7 +329,7 @@ class AnyInterleaving(RuleBasedStateMachine):
         self.speed, self.clutch = speed, held
         self.run(50)
 
-    @rule(seconds=st.sampled_from([1, 1, 1, 1, 60, 101, 101, 3600]))
+    @rule(seconds=st.sampled_from([1, 1, 1, 1, 60, 101, 101]))
     def rest(self, seconds):
         """Nobody moves for a while; whoever does then is obeyed."""
         self.into_motion(0.2, 30)
@@ -412,6 +412,10 @@ def test_a_rival_whose_command_waits_for_a_stalled_driver_ends_its_session():
     assert graph.driver.gate.refused[Refusal.SENDER] == 1
     assert graph.driver.gate.accepted == obeyed
     assert graph.driver.holding
+
+
+def test_who_rests_for_an_hour_is_obeyed_when_they_move_again():
+    AnyInterleaving().rest(seconds=3600)
 
 
 TestAnyInterleaving = AnyInterleaving.TestCase

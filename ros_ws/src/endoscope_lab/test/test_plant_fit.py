@@ -51,16 +51,19 @@ def test_wires_that_have_crept_or_were_tightened_hide_nothing(share):
     assert tip_missed(fit, bending) < np.deg2rad(1.0)
 
 
-def test_the_gear_is_that_of_the_rig():
-    plant = PlantDescription(joints={'bend_x': JointParameters()})
+def test_another_gear_comes_from_another_pulley():
+    plant = in_tube(random_instrument(np.random.default_rng(3)), 1.5, 0.1)
+    name, joint = next(iter(plant.joints.items()))
+    joint = replace(joint, pulley_radius=GEAR / 0.6 * joint.pulley_radius)
+    plant = replace(plant, joints={name: joint})
     made = simulate(plant, 0.6 * COMMAND[:, None])
-    wires = SensorModel(plant.sensors, 4).tension(made.tension.reshape(TIME.size, -1))
-    right, wrong = (
-        fit_plant(COMMAND, wires, gear=gear).parameters.joint.wire_stiffness for gear in (0.6, GEAR)
-    )
-    # Tensions alone take a shaft that turns less for a stiffer rig.
-    assert right == pytest.approx(JointParameters().wire_stiffness, rel=0.05)
-    assert wrong > 1.1 * JointParameters().wire_stiffness
+    wires = SensorModel(plant.sensors, 3).tension(made.tension.reshape(TIME.size, -1))
+    right, wrong = (fit_plant(COMMAND, wires, gear=gear).parameters.joint for gear in (0.6, 0.5))
+    assert right.pulley_radius == pytest.approx(joint.pulley_radius, rel=0.03)
+    assert wrong.pulley_radius > 1.15 * joint.pulley_radius
+    model = simulate(PlantDescription(joints={name: right}), 0.6 * COMMAND[:, None])
+    missed = model.bending_true[:, 0] - made.bending_true[:, 0]
+    assert np.sqrt(np.mean(missed**2)) < np.deg2rad(1.0)
 
 
 def test_the_nominal_rig_is_known_though_no_tube_of_the_family_is_like_it():

@@ -52,6 +52,8 @@ _SCORED_EVERY = 2
 _SHORTEST = 1000
 _SMALLEST_MOTION = float(np.deg2rad(20.0))
 _JOINT = 'bend_x'
+_GEAR = 0.5
+"""Of the rigs whose pulleys are known."""
 _DEVIATIONS = np.array([*FITTED.values(), *SHAPED.values(), BENDS[1]])
 _FTOL = 1e-3
 """Share of the cost by which a last step lowers it: a good fit of 9 s costs 144, and a number that
@@ -98,12 +100,14 @@ def fit_plant(
     # the optimum is smooth and single once the exponent is near. What bending the tube changes goes
     # along the lines of the shipped family, with the bend as one more unknown, about them priors of
     # the width that `FITTED` says. Radii and servo are the family's, or nominal where the nominal
-    # rig explains the tensions better.
+    # rig explains the tensions better. Where the gear is another, so is the pulley, which pulls as
+    # much wire for a radian at the joint: tensions alone would take it for other stiffness.
     u, wires, angle = _checked(command, tension, bending)
     if start is not None:
         rigs = [_whatever_the_bend(start)]
     else:
-        rigs = [shipped_family().joint, _whatever_the_bend(JointParameters())]
+        known = (shipped_family().joint, _whatever_the_bend(JointParameters()))
+        rigs = [_with_pulley(rig, _GEAR / gear) for rig in known]
     searches = [_Search.of(rig, gear * u, wires, angle) for rig in rigs]
     begun = [search.from_best_start() for search in searches]
     # The rig that explains the tensions better is ahead by then: it was in 24 of 24 calibrations.
@@ -123,6 +127,16 @@ def fit_plant(
 
 def _whatever_the_bend(joint: JointParameters) -> Callable[[float], JointParameters]:
     return lambda bend: joint
+
+
+def _with_pulley(
+    in_tube: Callable[[float], JointParameters], factor: float
+) -> Callable[[float], JointParameters]:
+    def joint(bend: float) -> JointParameters:
+        middle = in_tube(bend)
+        return replace(middle, pulley_radius=factor * middle.pulley_radius)
+
+    return joint
 
 
 def _rms(values: Array) -> float:
