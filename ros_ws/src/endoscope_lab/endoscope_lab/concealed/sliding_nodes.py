@@ -12,6 +12,12 @@ fronts that run into the wire: they come out.
 A wire of `cells` nodes has its tensions at s = i / cells, i = 0 .. cells; the springs at its two
 ends are half as long as the others, so the sums over the wire are trapezoidal rules and its two end
 tensions are those of the first and the last spring, with the whole exponent between them.
+
+The bending section is a row of hinges, bent alike. With section friction the wire on the inside of
+the bend rubs on a guide at each of them (capstan; Kaneko et al., IEEE ICRA 1991), and a hinge feels
+what arrives there. `section_friction` is that of the whole section as its moment shows it, mu in
+r T (1 - mu |q - qs|) to first order, r T the moment without: each of the three hinges rubs with
+1.5 mu per rad of its own bend, by which the wire loses exp(-1.5 mu |q - qs|) up to the last.
 """
 
 import math
@@ -42,11 +48,14 @@ NOMINAL: Plant = {
     'joint_friction': 9.0e-4,
     'joint_presliding': 0.03,
     'joint_presliding_spread': 0.0,
+    'section_friction': 0.0,
+    'section_straight_angle': 0.0,
     'joint_damping': 1.0e-5,
     'motor_bandwidth': 30.0,
     'motor_damping_ratio': 0.9,
 }
 
+HINGES = 3
 MOST_SWEEPS, MOST_GUESSES = 200_000, 30
 BEGUN = 1e-30  # m, of a node that is about to slip
 SETTLED = 1e-11  # N
@@ -96,8 +105,6 @@ def follow(
     plant: Plant, shaft: ArrayLike, tick: float, cells: int, acting: Acting | None = None
 ) -> tuple[Array, Array, Array]:
     """`at_motor, at_joint, angle` as `simulate` gives them, for a shaft whose angle is known."""
-    if plant.get('section_friction'):
-        raise ValueError('section_friction: sliding nodes end where the bending section begins')
     spread = float(plant['joint_presliding_spread'])
     elements = np.exp(spread * np.array([-1.0, 0.0, 1.0])) if spread else np.ones(1)
     grip, springs, tension = _wire(plant, cells)
@@ -112,6 +119,8 @@ def follow(
         'joint_rest_angle',
         'joint_friction',
         'joint_damping',
+        'section_friction',
+        'section_straight_angle',
     )
     settled = _follow(
         shaft - shaft[0],
@@ -293,7 +302,7 @@ def _imbalance(
     deflection: Array,
 ) -> float:
     """Torque in N m that a joint step in rad would leave over; it rises with the step."""
-    pulley, radius, stiffness, rest, friction, damping = p
+    pulley, radius, stiffness, rest, friction, damping, rubs, straight = p
     left_over = damping * step / tick + stiffness * (angle + step - rest)
     left_over += load[0] * math.sin(angle + step + load[1]) - moment
     beyond = abs(angle + step) - load[2]
@@ -301,6 +310,8 @@ def _imbalance(
         left_over += math.copysign(load[3] * beyond**1.5, angle + step)
     for i in range(len(presliding)):
         left_over += friction * _rubbed(deflection[i], step, presliding[i]) / len(presliding)
+    bend = angle + step - straight
+    inner = 0 if bend >= 0.0 else 1
     # Both wires are moved by the motor's turn in rad and by the step; not a number if a wire's
     # nodes do not settle.
     for wire in range(2):
@@ -316,8 +327,46 @@ def _imbalance(
             tension[wire],
         ):
             return math.nan
-        left_over -= sign * radius * tension[wire, -1]
+        pull = tension[wire, -1]
+        if rubs > 0.0 and wire == inner:
+            pull *= _left_at_hinges(rubs * bend, step, presliding, deflection)
+        left_over -= sign * radius * pull
     return left_over
+
+
+@compiled
+def _left_at_hinges(bent: float, step: float, presliding: Array, deflection: Array) -> float:
+    """Mean over the hinges of the share that arrives there of the inner wire's tension.
+
+    `bent` is mu (q - qs), of the sign of the bend, after a joint step in rad.
+    """
+    # Hinges in a row add their angles, each against n times the stiffness of them all. Hinge i
+    # balances for itself what arrives there, r T_i against n K q_i, and the mean of all n balances
+    # is that of one joint on which the mean of T_i acts. At each the tension falls by the capstan's
+    # ratio. All are taken as bent alike, by (q - qs) / n; that T_i differ changes only O(a^2):
+    #
+    #     T_i = T_(i-1) exp(-a s_i),   mean T_i = T (1 - a sum_i (n + 1 - i) s_i / n) + O(a^2),
+    #
+    # s_i how far the wire's friction there has built up. Where all s_i are one, the sum over n is
+    # (n + 1) / 2, so all of it is mu (q - qs) for a = 2 mu (q - qs) / (n + 1).
+    #
+    # A growing bend draws the inner wire towards the motor, and s_i has the sign of q - qs then:
+    # less arrives at every hinge. A shrinking one lets it go, and more does. A hinge turns as its
+    # wire slides, so s_i is the state of an element of the joint's friction. Of unlike elements the
+    # first hinge has the one of the least angle: there the wire slides by what all hinges turn.
+    #
+    # At straight all ratios are one, whichever wire is the inner one: the imbalance has no jump. It
+    # rises with the step but for what |q - qs| adds to a wire that is let go, by which it falls at
+    # no more than r T mu exp(2 n / (n + 1) mu |q - qs|). Where that is more than stiffness and
+    # damping have it rise, of a wire that is very taut, the joint snaps to less bend. There is a
+    # root in any case: far out the wire that would bend the joint further is slack.
+    own_bent = 2.0 / (HINGES + 1.0) * bent
+    arriving, share = 1.0, 0.0
+    for hinge in range(HINGES):
+        i = min(hinge, len(presliding) - 1)
+        arriving *= math.exp(-own_bent * _rubbed(deflection[i], step, presliding[i]))
+        share += arriving / HINGES
+    return share
 
 
 @compiled
