@@ -62,6 +62,26 @@ def test_the_plant_agrees_with_sliding_nodes(numbers):
     assert_allclose(made.tension[:, 0], at_motor, atol=1.5 * coarse)
 
 
+@pytest.mark.parametrize(('size_deg', 'apart_deg'), [(30.0, 0.1), (60.0, 0.4)])
+def test_section_friction_in_one_piece_agrees_with_that_of_three_hinges(size_deg, apart_deg):
+    command = np.deg2rad(size_deg * np.sin(np.arange(0.0, 6.5, TICK)))
+
+    def apart(mu, of_hinges):
+        joint = JointParameters(
+            joint_friction=2e-4, section_friction=mu, section_straight_angle=-0.15
+        )
+        plant = PlantDescription(joints={'bend_x': joint})
+        made = simulate(plant, command[:, None], TICK).bending_true[:, 0]
+        slave = asdict(replace(joint, section_friction=of_hinges))
+        *_, angle = sliding_nodes.simulate(slave, command, TICK, 30)
+        return np.rad2deg(np.max(np.abs(made - angle)))
+
+    off = apart(0.45, 0.45)
+    assert off < apart_deg < 0.1 * apart(0.45, 0.0)
+    # Of second order in the wrap: a quarter at half the friction, by which it bends a little more.
+    assert apart(0.225, 0.225) < 0.45 * off
+
+
 def answer(joint, shaft):
     """Tensions (N, 2) at the motor and angle (N,) of the sliding nodes, for commands (N,)."""
     slave = asdict(replace(joint, joint_presliding_spread=SPREAD))
