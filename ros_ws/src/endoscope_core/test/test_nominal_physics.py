@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from endoscope_core.errors import FileError
-from endoscope_core.physics import EffectSpec, JointParameters, PlantDescription, simulate
+from endoscope_core.physics import EffectSpec, PlantDescription, simulate
+from endoscope_core.physics.description import SLAVE
 from endoscope_core.physics.effects import NOMINAL_PHYSICS
 from endoscope_core.physics.packing import pack
 from endoscope_core.physics.plant_file import load_plant, save_plant
@@ -17,7 +18,7 @@ COMMAND = np.stack([0.9 * np.sin(3.0 * TIME)], axis=1)
 
 def lacking(name):
     first = NOMINAL_PHYSICS[name].parameters[0]
-    return replace(JointParameters(), **{first.name: first.off})
+    return replace(SLAVE, **{first.name: first.off})
 
 
 def readings(plant):
@@ -27,14 +28,14 @@ def readings(plant):
 
 @pytest.mark.parametrize('name', NOMINAL_PHYSICS)
 def test_a_plant_without_a_piece_is_simulated_and_answers_otherwise(name):
-    whole = readings(PlantDescription({'bend_x': JointParameters()}))
+    whole = readings(PlantDescription({'bend_x': SLAVE}))
     without = readings(PlantDescription({'bend_x': lacking(name)}))
     assert np.isfinite(without).all()
     assert np.abs(without - whole).max() > 1e-3
 
 
 def test_a_rigid_wire_without_anything_else_turns_the_joint_as_its_radii_do():
-    joint = JointParameters()
+    joint = SLAVE
     for name in NOMINAL_PHYSICS:
         first = NOMINAL_PHYSICS[name].parameters[0]
         joint = replace(joint, **{first.name: first.off})
@@ -50,7 +51,7 @@ def test_added_as_an_effect_a_piece_is_the_number_that_it_has(name, tmp_path):
     added = PlantDescription(
         {'bend_x': lacking(name)}, effects=(EffectSpec(name, 'bend_x', values),)
     )
-    own = PlantDescription({'bend_x': replace(JointParameters(), **values)})
+    own = PlantDescription({'bend_x': replace(SLAVE, **values)})
     np.testing.assert_array_equal(readings(added), readings(own))
     save_plant(added, tmp_path / 'plant.yaml')
     assert load_plant(tmp_path / 'plant.yaml') == own

@@ -82,7 +82,7 @@ def test_a_past_that_no_reversals_explain_is_left_out_though_little_is_left(reco
     command = shipped_rig().joints.gear * np.stack([angle, angle], axis=1)
     recording = since(record(duration=9.4, command=command), 4.0)
     audit = audit_recording(recording, PLANT)
-    assert {f.remedy for f in audit.findings} == {'what is before 4.94 s is not judged'}
+    assert {f.remedy for f in audit.findings} == {'what is before 4.77 s is not judged'}
     assert worst(audit.recording) < 1.3 < 3.0 < worst(recording)
 
 

@@ -207,8 +207,8 @@ BENCHES: dict[str, Bench] = {
     'real': Bench(
         'real.tables',
         'explain real recordings of a flexible endoscope by one physics',
-        'Fits five tubes together on their first cycle and searches what they lack, predicts the '
-        'second cycles, and carries what was found to the rig in other states. The recordings are '
+        'Fits five tubes together on 1.3 cycles and searches what they lack, predicts the rest, '
+        'and carries what was found to the rig in other states. The recordings are '
         'no part of this project: optimization/selected and operation/optimizer_input of '
         'nhoyh/hysteresis_compensation_ROS, in one folder.',
         (

@@ -41,7 +41,7 @@ def test_no_tube_makes_the_friction_of_a_straight_one_vanish():
 
 
 def test_an_instrument_that_the_most_bent_tube_holds_is_drawn_again():
-    held = random_instrument(np.random.default_rng(4))
+    held = random_instrument(np.random.default_rng(4), widening=1.8)
     assert configuration_of_size(held, np.deg2rad(70.0), -GREATEST_UNEVENNESS) is None
 
 

@@ -14,16 +14,16 @@ from endoscope_lab.papers.tracking_trial import (
 )
 
 
-def test_from_tensions_alone_the_physical_inverse_takes_away_nine_tenths_of_the_error():
+def test_from_tensions_alone_the_physical_inverse_leaves_a_twentieth_of_the_error():
     tube = never_seen_tube(9, 0)
     findings = calibrate(tube, load_classifier())
     assert findings.size == pytest.approx(tube.size, abs=np.deg2rad(8.0))
-    signal = periodic_signal(3.5 * np.pi)
+    signal = within_reach(periodic_signal(3.5 * np.pi), tube.plant)
     none = run_tracking_trial(tube.plant, signal, FeedforwardLaw(), False, tube.noise)
     law = LawChoice(2).law('physical', 'plant', findings)
     helped = run_tracking_trial(tube.plant, signal, law, False, tube.noise)
-    assert helped.rmse < 0.10 * none.rmse
-    assert backlash_left(helped, signal) < np.deg2rad(5.0)
+    assert helped.rmse < 0.05 * none.rmse
+    assert backlash_left(helped, signal) < np.deg2rad(1.0)
 
 
 def test_the_bouc_wen_set_of_the_class_leaves_a_quarter_of_the_error():

@@ -17,6 +17,7 @@ from endoscope_core.control.internal_model import PhysicalParameters
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.metrics import NoLoopError, width_at_mid_height
 from endoscope_core.physics import JointParameters, PlantDescription, simulate
+from endoscope_core.physics.description import SLAVE
 from endoscope_core.physics.effects import KNOWN
 from endoscope_core.physics.family import CENTRE, MOST_BENT, shipped_family
 from endoscope_core.signals import CALIBRATION_RATE, calibration_motion
@@ -27,11 +28,12 @@ _RATE, _, _SPAN = KNOWN['pretension_loss'].parameters
 _LOSS_N = _RATE.typical * _SPAN.typical
 FITTED = {
     'capstan_exponent': 1.0,
-    'pretension': -math.log1p(-_LOSS_N / JointParameters().pretension),
+    'pretension': -math.log1p(-_LOSS_N / SLAVE.pretension),
     'wire_stiffness': 0.1,
     'joint_stiffness': 0.1,
     'joint_friction': 0.1,
     'joint_presliding': 0.15,
+    'section_friction': 0.1,
 }
 """What is fitted, and the standard deviation of its logarithm from instrument to instrument in
 tubes of one bend; of the pretension, which creeps and is tightened again by hand, that of the
@@ -60,6 +62,8 @@ _FTOL = 1e-3
 is off by its standard deviation a half more."""
 _FEW_EVALUATIONS, _MOST_EVALUATIONS = 3, 12
 """Of a fit that shows which rig is nearer, and of the one that goes on from there."""
+_CLEARLY = 2.0
+"""Times what the better rig leaves, beyond which the other is not gone on with."""
 
 
 class PlantFitError(EndoscopeError, ValueError):
@@ -106,22 +110,27 @@ def fit_plant(
     if start is not None:
         rigs = [_whatever_the_bend(start)]
     else:
-        known = (shipped_family().joint, _whatever_the_bend(JointParameters()))
+        known = (shipped_family().joint, _whatever_the_bend(SLAVE))
         rigs = [_with_pulley(rig, _GEAR / gear) for rig in known]
     searches = [_Search.of(rig, gear * u, wires, angle) for rig in rigs]
     begun = [search.from_best_start() for search in searches]
-    # The rig that explains the tensions better is ahead by then: it was in 24 of 24 calibrations.
-    search, begin = min(
-        zip(searches, begun, strict=True), key=lambda pair: pair[0].tension_rmse(pair[1].x)
-    )
-    found = search.fitted(begin.x, _MOST_EVALUATIONS)
+    # A rig that explains the tensions much better by then is the one; of rigs that are alike each
+    # goes on to the end.
+    left = [search.tension_rmse(each.x) for search, each in zip(searches, begun, strict=True)]
+    ends = [
+        (search, search.fitted(each.x, _MOST_EVALUATIONS))
+        for search, each, rmse in zip(searches, begun, left, strict=True)
+        if rmse < _CLEARLY * min(left)
+    ]
+    search, found = min(ends, key=lambda pair: pair[0].tension_rmse(pair[1].x))
     wires_off, angle_off = search.misfits(found.x)
     columns = 1 + len(found.x)
     return PlantFit(
         search.physical(found.x),
         _rms(wires_off),
         _rms(angle_off) if angle_off.size else None,
-        len(rigs) * len(_STARTS) + columns * (found.nfev + sum(each.nfev for each in begun)),
+        len(rigs) * len(_STARTS)
+        + columns * sum(each.nfev for each in (*begun, *(end for _, end in ends))),
     )
 
 
@@ -164,7 +173,7 @@ class _Search:
 
     @cached_property
     def expected(self) -> Array:
-        """Coordinates (11,) of a rig of which nothing is known."""
+        """Coordinates (12,) of a rig of which nothing is known."""
         profile = self.in_tube(CENTRE).friction_profile
         expected = np.zeros(len(FITTED) + len(SHAPED) + 1)
         expected[-2] = profile[0] if profile else 0.0
@@ -279,7 +288,7 @@ def size_of_explained(fits: Sequence[PlantFit], gear: float) -> float | None:
 
 def lost_pretension(fits: Sequence[PlantFit]) -> list[float]:
     """What each joint's wires have less pretension by than the rigs that are known, N."""
-    least = min(shipped_family().joint(CENTRE).pretension, JointParameters().pretension)
+    least = min(shipped_family().joint(CENTRE).pretension, SLAVE.pretension)
     return [max(0.0, least - fit.parameters.joint.pretension) for fit in fits]
 
 

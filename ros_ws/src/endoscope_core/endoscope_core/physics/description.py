@@ -133,11 +133,11 @@ class JointParameters:
     )
     section_friction: float = _number(
         0.0, '1/rad', 'capstan friction of the bending section on the wire inside its bend',
-        0.0, 10.0, Stage.JOINT,
+        0.0, 10.0, Stage.JOINT, scaled=True,
     )
     section_straight_angle: float = _number(
         0.0, 'rad', 'angle at which the section is straight and has none of that friction',
-        -math.pi, math.pi, Stage.JOINT, keeper=Keeper.DEVICE,
+        -math.pi, math.pi, Stage.JOINT, spread=0.05, keeper=Keeper.DEVICE,
     )
     joint_damping: float = _number(
         1.0e-5, 'N m s/rad', 'viscous moment of the bending section',
@@ -286,9 +286,9 @@ class TermSpec:
     lag_s: float | None = None
 
 
-def nominal_joints() -> dict[str, JointParameters]:
-    """Both joints of the nominal rig."""
-    return {'bend_x': JointParameters(), 'bend_y': JointParameters()}
+def joints_of_slave() -> dict[str, JointParameters]:
+    """Both joints of the simulated slave."""
+    return {'bend_x': SLAVE, 'bend_y': SLAVE}
 
 
 @dataclass(frozen=True)
@@ -298,7 +298,7 @@ class PlantDescription:
     `effects` are of the catalogue, `terms` are functions where it has none.
     """
 
-    joints: Mapping[str, JointParameters] = field(default_factory=nominal_joints)
+    joints: Mapping[str, JointParameters] = field(default_factory=joints_of_slave)
     sensors: SensorParameters = field(default_factory=SensorParameters)
     effects: tuple[EffectSpec, ...] = ()
     terms: tuple[TermSpec, ...] = ()
@@ -327,3 +327,8 @@ def _check_numbers(parameters: JointParameters | SensorParameters) -> None:
         low = NUMBERS[key].low
         if low >= 0.0 and (value < 0.0 or (value == 0.0 and low > 0.0)):
             raise ValueError(f'{key} is {value}: it must be positive')
+
+
+SLAVE = JointParameters(joint_friction=5.0e-4, section_friction=0.3)
+"""A joint of the simulated slave: some of its friction grows with the bend, as on the real
+endoscope. A joint of which nothing is said has none of that."""

@@ -140,6 +140,8 @@ class NominalPhysics(Effect):
     `NOMINAL_KEYS`; a joint lacks it where the first of them is `off`.
     """
 
+    in_every_rig: bool = True  # that a rig has none is no hypothesis
+
     def _block(self) -> int:
         return NOMINAL_KEYS.index(self.parameters[0].name)
 

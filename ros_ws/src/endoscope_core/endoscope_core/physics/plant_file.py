@@ -12,6 +12,7 @@ from endoscope_core.atomic_output import write_text
 from endoscope_core.errors import FileError, nearest
 from endoscope_core.physics.description import (
     NUMBERS,
+    SLAVE,
     EffectSpec,
     JointParameters,
     PlantDescription,
@@ -198,13 +199,15 @@ def plant_as_text(plant: PlantDescription) -> str:
 
 
 def nominal_plant_text() -> str:
-    """Return the nominal rig as a plant.yaml with comments, which `load_plant` reads."""
+    """Return the simulated slave as a plant.yaml with comments, which `load_plant` reads."""
+    left_out = JointParameters()
     lines = [
-        '# The nominal plant, whole. Every key may be left out and has this value then.',
+        '# The simulated slave, whole. A key may be left out and has this value then, but for a',
+        f'# joint_friction of {left_out.joint_friction:g}, and a section_friction of none.',
         'joints:',
     ]
     for name in JOINT_NAMES:
-        lines += [f'  {name}:', *_commented(asdict(JointParameters()), 4)]
+        lines += [f'  {name}:', *_commented(asdict(SLAVE), 4)]
     lines += ['sensors:', *_commented(asdict(SensorParameters()), 2)]
     lines += [
         '# Physics beyond that: `endoscope effects` lists it, `endoscope effects ID` tells all.',

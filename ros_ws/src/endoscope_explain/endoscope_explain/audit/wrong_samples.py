@@ -204,6 +204,7 @@ def find_outliers(values: Array, noise: float, travel: Array) -> Mask:
     if len(values) < 20:
         return wrong
     scale = max(noise, _quiet_noise(values))
+    coarse = _step_of_coarse(values)
     # A bending section may jump there and back within three samples where its motor does: a spike
     # counts only where it is larger than the motor's travel around it, and where it stands alone
     # against the signal's own roughness nearby.
@@ -212,7 +213,8 @@ def find_outliers(values: Array, noise: float, travel: Array) -> Mask:
         heights = _larger(spike_heights(values[kept], 2), spike_heights(values[kept]))
         roughness = _roughness_nearby(heights)
         chance = spike_chance(heights, scale)
-        lonely = np.abs(heights) > np.maximum(3.0 * roughness, TRAVEL_FACTOR * travel[kept])
+        beyond = np.maximum(3.0 * roughness, TRAVEL_FACTOR * np.maximum(travel[kept], coarse))
+        lonely = np.abs(heights) > beyond
         bound = 1e-6
         found = (chance < bound) & lonely
         surprising = poisson.sf(found.sum() - 1, len(kept) * bound) < 1e-4 if found.any() else False
@@ -271,6 +273,14 @@ def _quiet_noise(values: Array) -> float:
     # where the signal is smooth; the median ignores what is not.
     inner = values[2:-2] - (4.0 * (values[1:-3] + values[3:-1]) - (values[:-4] + values[4:])) / 6.0
     return float(np.median(np.abs(inner)) / 0.6745 / np.sqrt(1.0 + 34.0 / 36.0))
+
+
+def _step_of_coarse(values: Array) -> float:
+    """Smallest step of a reading that is coarser than its noise, by which it may go to and fro."""
+    steps = np.abs(np.diff(values))
+    if np.mean(steps == 0.0) <= COARSE or not steps.any():
+        return 0.0
+    return float(np.min(steps[steps > 0.0]))
 
 
 def _roughness_nearby(heights: Array, reach: int = 6) -> Array:

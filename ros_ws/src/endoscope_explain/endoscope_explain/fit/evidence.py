@@ -130,6 +130,17 @@ def fitted_at(time: Array) -> Mask:
     return np.asarray((phase >= GAP_S) & (phase < BLOCK_S * (EVERY - 1) - GAP_S))
 
 
+def folds(time: Array) -> list[tuple[Mask, Mask]]:
+    """Samples (N,) that are fitted and that are judged, each sample judged once."""
+    found = []
+    for shift in range(EVERY):
+        moved = time + BLOCK_S * (EVERY - 1 - shift)
+        judged = np.mod(moved, BLOCK_S * EVERY) >= BLOCK_S * (EVERY - 1)
+        if judged.any():
+            found.append((fitted_at(moved), judged))
+    return found
+
+
 def held_out_residuals(final: Fit) -> Array:
     """Residuals (size,) of a fit that has not seen the held-out blocks."""
     time = final.model.observation.times

@@ -120,7 +120,11 @@ def nominal_parameters(base: Array, band: float = BAND) -> tuple[FreeParameter, 
             )
         )
     share = min(band / BAND, 1.0)
-    free += [_scattered(key, float(base[index]), share) for key, index in SCATTERED.items()]
+    free += [
+        _scattered(key, float(base[index]), share)
+        for key, index in SCATTERED.items()
+        if index not in absent
+    ]
     mean, spread = LEAD_PRIOR
     free.append(FreeParameter(LEAD, 'reading_lead', False, 1.0, 0.0, 1.0, mean, spread))
     return tuple(free)

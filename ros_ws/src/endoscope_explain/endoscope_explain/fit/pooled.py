@@ -8,7 +8,7 @@ bent sheath does to a wire is each recording's own.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,9 +22,9 @@ from endoscope_core.physics.layout import (
     NOMINAL_KEYS,
     PROFILE_TERMS,
 )
-from endoscope_explain.fit.evidence import weights
+from endoscope_explain.fit.evidence import folds, weights
 from endoscope_explain.fit.free_parameters import LEAD, FreeParameter
-from endoscope_explain.fit.model import Fit, JointModel, central_jacobian
+from endoscope_explain.fit.model import Fit, JointModel, central_jacobian, fit
 from endoscope_explain.fit.solver import STEP, Effort, Renewal, minimise
 
 Array = NDArray[np.float64]
@@ -57,6 +57,7 @@ _OF_A_SHAPE = frozenset(
 
 ROUGH = Effort(12, 1e-3, (10.0 * STEP,), Renewal.ALWAYS)
 ON_THE_WAY = Effort(20, 1e-3, (STEP, 10.0 * STEP), Renewal.ALWAYS)
+FORETOLD = 12, 1e-3
 THOROUGH = Effort(30, 1e-4, (STEP, 10.0 * STEP, 60.0 * STEP), Renewal.ALWAYS)
 
 
@@ -132,6 +133,60 @@ def judged_alone(fits: Sequence[Fit]) -> list[Fit]:
             replace(found, model=told, theta=theta, jacobian=found.jacobian[:, kept], cost=cost)
         )
     return alone
+
+
+def foretold(fits: Sequence[Fit]) -> list[Array]:
+    """Residuals (size,) of each recording by what the others say of the rig.
+
+    Devices have the numbers that the others give, pooled ones the others' mean for a prior. What
+    may scatter is refitted, to other blocks than those that are judged.
+    """
+    # The others' optimum is a Gauss-Newton step from that of all: an infinitesimal jackknife
+    # (Giordano et al., AISTATS 2019).
+    layout, whole = _laid_out(fits)
+    weight = [weights(f.model.observation, f.residuals) for f in fits]
+    found = []
+    for left_out, (own, columns) in enumerate(zip(fits, layout.columns, strict=True)):
+        others = [n for n in range(len(fits)) if n != left_out]
+        kept = np.unique(np.concatenate([layout.columns[n] for n in others]))
+        pools = tuple(np.intersect1d(pool, kept) for pool in layout.pools)
+        theirs = _Together(
+            [fits[n].model for n in others],
+            replace(layout, columns=tuple(layout.columns[n] for n in others), pools=pools),
+            SPREAD,
+            [weight[n] for n in others],
+        )
+        normal, gradient = theirs.normal_equations(
+            whole, [fits[n].residuals for n in others], [fits[n].jacobian for n in others]
+        )
+        normal = normal[np.ix_(kept, kept)]
+        normal += 1e-9 * np.diag(np.maximum(np.diag(normal), 1e-12))
+        moved = whole.copy()
+        moved[kept] -= np.linalg.solve(normal, gradient[kept])
+        moved = np.clip(moved, layout.low, layout.high)
+        means = {
+            int(place): float(np.mean(moved[theirs_of]))
+            for pool, theirs_of in zip(layout.pools, pools, strict=True)
+            for place in pool
+        }
+        told, theta = _alone(own.model, moved[columns], columns, means)
+        residuals = own.residuals.copy()
+        for fitted, judged in folds(own.model.observation.times):
+            again = fit(told, theta, fitted * weight[left_out], *FORETOLD)
+            residuals[judged] = again.residuals[judged]
+            theta = again.theta
+        found.append(residuals)
+    return found
+
+
+def _alone(
+    model: JointModel, theta: Array, columns: Indices, means: Mapping[int, float]
+) -> tuple[JointModel, Array]:
+    """A recording's model with devices held, and its coordinates, pooled ones drawn to means."""
+    base, _ = model.packed(theta)
+    kept = [k for k, item in enumerate(model.free) if item.index not in _OF_A_DEVICE]
+    free = tuple(_drawn_to(model.free[k], means.get(int(columns[k]))) for k in kept)
+    return replace(model, base=base, free=free), theta[kept]
 
 
 def _laid_out(fits: Sequence[Fit]) -> tuple[_Layout, Array]:

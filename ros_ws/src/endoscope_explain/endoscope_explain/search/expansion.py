@@ -4,8 +4,11 @@ import math
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass
 
+from endoscope_core.physics.effect import Traits
 from endoscope_core.workers import parallel_map
 from endoscope_explain.fit.model import Fit
+from endoscope_explain.observe.observation import JointObservation
+from endoscope_explain.search.left_out import repeat_one_motion
 from endoscope_explain.search.null_rigs import NEAR
 from endoscope_explain.search.refit import (
     Candidate,
@@ -70,12 +73,20 @@ def _terms(behind: Sequence[Background], left_out: tuple[str, ...]) -> list[tupl
     """What may be missing from the joint, of each recording."""
     if len(behind) == 1:
         return [addable(behind[0], left_out)]
-    # What was fitted to one motion is not told from time by another.
+    # What was fitted to one motion is not told from time by another, nor time from what depends on
+    # a motion that is the same in all of them.
+    always = repeat_one_motion([each.fit.model.observation for each in behind])
+
+    def told_from_time(traits: Traits, observation: JointObservation) -> bool:
+        if traits.depends_on_time and always:
+            return False
+        return not traits.resembles_time or motion_repeats(observation)
+
     found = [
         [
             term
             for term in effects(each.fit, left_out)
-            if not term.effect.traits.resembles_time or motion_repeats(each.fit.model.observation)
+            if told_from_time(term.effect.traits, each.fit.model.observation)
         ]
         for each in behind
     ]

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from endoscope_core.physics.effects import lacking
+from endoscope_core.workers import parallel_map
 from endoscope_explain.fit.model import Fit
 from endoscope_explain.fit.nominal import is_at_tolerance, with_any_numbers
 from endoscope_explain.search.expansion import (
@@ -24,6 +25,7 @@ from endoscope_explain.search.expansion import (
     first_of_each,
     screen_terms,
 )
+from endoscope_explain.search.left_out import LEAST_RECORDINGS, assured, chance
 from endoscope_explain.search.null_rigs import (
     NO_DETECTABLE_GAIN,
     Null,
@@ -57,6 +59,8 @@ class Level:
     null: Null  # what is shown where nothing is missing
     # Whether the best one predicts blocks that it has not seen better than its parent.
     predicts: bool = True
+    # Whether candidates are judged by leaving each recording out: the best first by that.
+    by_left_out: bool = False
 
     def gain(self, one: Candidate) -> float:
         """Logarithm of the evidence of a candidate over its parent's."""
@@ -68,6 +72,8 @@ class Level:
         # Other numbers, then what every rig has, and then a formula stand where they lose no more
         # than form is worth.
         top, worth = self.found[0], self.form_is_worth()
+        if self.by_left_out:
+            return top
 
         def first(candidates: Iterable[Candidate]) -> Candidate | None:
             return next((c for c in candidates if top.evidence - c.evidence <= worth), None)
@@ -100,6 +106,8 @@ class Level:
     @property
     def p_value(self) -> float:
         """Chance that a rig in which nothing is missing shows as much as the best candidate."""
+        if self.by_left_out:
+            return chance(self.best.foretold - self.parent.foretold)
         return self.null.p_value(self.gain(self.best)) if self.found else 1.0
 
     @property
@@ -107,6 +115,8 @@ class Level:
         """Whether something is missing, and found."""
         # Nominal physics needs no more than to be worth its numbers: that a rig has none is no
         # hypothesis.
+        if self.by_left_out:
+            return self.p_value <= FALSE_ALARMS
         if self.found and self.best.adds_nominal:
             return self.gain(self.best) > 0.0 and self.predicts
         return self.p_value <= FALSE_ALARMS and self.predicts
@@ -120,6 +130,12 @@ class Level:
 
     def rivals(self) -> tuple[Candidate, ...]:
         """Candidates behind the best one by no more than form is worth."""
+        if self.by_left_out:
+            best = self.best
+            behind = {
+                id(c): chance(best.foretold - c.foretold) for c in self.found if c is not best
+            }
+            return tuple(c for c in self.found if behind.get(id(c), 0.0) > FALSE_ALARMS)
         least = self.found[0].evidence - self.form_is_worth()
         return tuple(c for c in self.found if c is not self.best and c.evidence >= least)
 
@@ -157,7 +173,7 @@ def search(
     """
     nominal = candidate((), *(references[0] for references in recordings))
     joint = nominal.fits[0].model.observation.joint
-    depth += len(lacking(nominal.fits[0].model.base))
+    depth += sum(each.in_every_rig for each in lacking(nominal.fits[0].model.base))
     if not nominal.is_noise:
         # What only the numbers are still worth is no gain of a term.
         nominal = converged(converged(nominal))
@@ -230,10 +246,21 @@ def _level(
     ranked = tuple(first_of_each(found, lambda c: frozenset(term.variant for term in c.terms)))
     if not ranked:
         return Level(first, (), NO_DETECTABLE_GAIN)
+    if len(first.fits) >= LEAST_RECORDINGS:
+        return _by_left_out(first, ranked, jobs)
     if not ranked[0].is_noise:
         ranked = (by_fine_derivatives(ranked[0]), *ranked[1:])
     level = _beside_nothing_missing(Level(first, ranked, NO_DETECTABLE_GAIN), screens[0], jobs)
     return replace(level, predicts=level.best.unseen_misfit < first.unseen_misfit)
+
+
+def _by_left_out(first: Candidate, ranked: Sequence[Candidate], jobs: int) -> Level:
+    """A level whose candidates are judged in recordings that were left out."""
+    settled = parallel_map(converged, ranked, jobs)
+    gains = [each.foretold - first.foretold for each in settled]
+    order = np.argsort([-assured(each, FALSE_ALARMS) for each in gains], kind='stable')
+    found = tuple(settled[k] for k in order)
+    return Level(first, found, NO_DETECTABLE_GAIN, by_left_out=True)
 
 
 def _beside_nothing_missing(level: Level, screen: Screened, jobs: int) -> Level:

@@ -25,6 +25,7 @@ from endoscope_explain.fit.free_parameters import COORDINATE
 from endoscope_explain.fit.model import Fit, JointModel, broyden_fit, fit, jacobian
 from endoscope_explain.fit.pooled import fit_together, with_common_numbers
 from endoscope_explain.fit.valleys import out_of_valleys
+from endoscope_explain.search.left_out import likelihoods
 from endoscope_explain.search.term import Term, states_of
 
 Array = NDArray[np.float64]
@@ -70,6 +71,11 @@ class Candidate:
             for each, left in zip(self.fits, self.unseen, strict=True)
         )
 
+    @cached_property
+    def foretold(self) -> Array:
+        """Logarithm (n,) of the likelihood of each recording by the others, of several."""
+        return likelihoods(self.fits)
+
     @property
     def effects(self) -> tuple[str, ...]:
         """Ids of those that are effects of the catalogue."""
@@ -78,7 +84,7 @@ class Candidate:
     @property
     def adds_nominal(self) -> bool:
         """Whether the last term is a piece of the nominal physics, which every rig has."""
-        return bool(self.terms) and self.terms[-1].is_nominal
+        return bool(self.terms) and self.terms[-1].is_in_every_rig
 
 
 def candidate(terms: tuple[Term, ...], *fits: Fit) -> Candidate:

@@ -61,8 +61,13 @@ class Term:
 
     @property
     def is_nominal(self) -> bool:
-        """Whether it is a piece of the nominal physics, which every rig has."""
+        """Whether it is a piece of the nominal physics."""
         return isinstance(self.effect, NominalPhysics)
+
+    @property
+    def is_in_every_rig(self) -> bool:
+        """Whether that a rig has none of it is no hypothesis."""
+        return isinstance(self.effect, NominalPhysics) and self.effect.in_every_rig
 
     @property
     def multiplies(self) -> bool:

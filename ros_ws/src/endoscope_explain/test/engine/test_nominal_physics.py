@@ -32,7 +32,7 @@ def test_what_the_nominal_plant_lacks_is_named_with_its_number(one_joint):
 
 
 def test_only_what_a_plant_lacks_is_looked_for(one_joint):
-    whole = one_joint.rig()
+    whole = one_joint.rig(section_friction=0.3)
     (seen,) = observe(one_joint.record(whole, one_joint.motion(4.0)), whole)
     fitted, _ = nominal_references(seen, *packed_joint(whole, 'bend_x'))
     assert not {term.id for term in effects(fitted)} & set(NOMINAL_PHYSICS)

@@ -24,8 +24,8 @@ DRILLED = 0.01
 UNEVENNESS = 0.3
 """Rms of the first coefficient that a rig's friction profile differs by; the next are smaller."""
 TIGHTENING, REST_ANGLE, SPREAD = 0.15, 0.03, 0.25
-"""Half-widths of the difference of the pretension's profile, of the joint's rest angle in rad and
-of the spread of its pre-sliding."""
+"""Half-widths of the difference of the pretension's profile, of the angles in rad at which a joint
+rests and its section is straight, and of the spread of its pre-sliding."""
 
 
 def described_rig(generator: np.random.Generator, joints: int) -> PlantDescription:
@@ -53,6 +53,8 @@ def true_rig(
             friction_profile=_sum(joint.friction_profile, terms),
             pretension_profile=float(np.clip(tightened, -1.0, 1.0)),
             joint_rest_angle=joint.joint_rest_angle + REST_ANGLE * generator.uniform(-1.0, 1.0),
+            section_straight_angle=joint.section_straight_angle
+            + REST_ANGLE * generator.uniform(-1.0, 1.0),
             joint_presliding_spread=joint.joint_presliding_spread + SPREAD * generator.uniform(),
         )
     return replace(described, joints=joints)
@@ -93,6 +95,7 @@ def spreads(joint: JointParameters) -> dict[str, float]:
         **{key: OFF * uniform * getattr(joint, key) for key in SCALED_NOMINAL},
         'pretension_profile': -TIGHTENING * uniform,
         'joint_rest_angle': REST_ANGLE * uniform,
+        'section_straight_angle': REST_ANGLE * uniform,
         'joint_presliding_spread': SPREAD * uniform,
         **{f'friction_profile_{k}': UNEVENNESS / k for k in (1, 2, 3)},
     }

@@ -24,6 +24,7 @@ RELATIVE_SPREAD = {
     'joint_damping': 0.15,
     'joint_friction': 0.20,
     'joint_presliding': 0.15,
+    'section_friction': 0.20,
     'motor_bandwidth': 0.05,
     'motor_damping_ratio': 0.05,
 }

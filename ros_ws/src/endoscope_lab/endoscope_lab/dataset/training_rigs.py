@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.metrics import NoLoopError, width_at_mid_height
 from endoscope_core.physics import EffectSpec, PlantDescription, PlantTrajectory, simulate
-from endoscope_core.physics.description import JointParameters
+from endoscope_core.physics.description import SLAVE, JointParameters
 from endoscope_core.physics.family import MOST_BENT, shipped_family
 from endoscope_core.signals import CALIBRATION_RATE, CalibrationMotion, calibration_motion
 from endoscope_lab.dataset.calibration_dataset import CLASSES_DEG
@@ -35,9 +35,10 @@ DIFFERING = (
     'joint_stiffness',
     'joint_friction',
     'joint_presliding',
+    'section_friction',
     'motor_bandwidth',
 )
-FADING = ('joint_rest_angle', 'joint_presliding_spread')
+FADING = ('joint_rest_angle', 'joint_presliding_spread', 'section_straight_angle')
 """Numbers in which the nominal slave is another instrument, and those that it has none of."""
 _EXTREME = 0.2
 _STRAIGHT, _BENT = np.deg2rad([60.0, 240.0])
@@ -219,7 +220,7 @@ def towards_nominal(plant: PlantDescription, share: float) -> PlantDescription:
     The two differ by more than instruments of one make do: in the radius of a joint by 14 %.
     Numbers go a share of the way by their logarithms; what the nominal slave has none of fades.
     """
-    recorded, nominal = shipped_family().joint(0.0), JointParameters()
+    recorded, nominal = shipped_family().joint(0.0), SLAVE
     left = max(1.0 - share, 0.0)
 
     def moved(joint: JointParameters) -> JointParameters:

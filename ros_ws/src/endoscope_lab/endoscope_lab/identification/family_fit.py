@@ -32,6 +32,8 @@ PRIORS: Mapping[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
     'joint_presliding': ((0.03, 0.0), (0.5, 0.1)),
     'joint_rest_angle': ((0.0, 0.0, 0.0), (0.1, 0.1, 0.1)),
     'joint_presliding_spread': ((0.6,), (0.5,)),
+    'section_friction': ((0.4,), (0.5,)),
+    'section_straight_angle': ((0.0,), (0.2,)),
     'joint_radius': ((0.0008,), (0.3,)),
     'pulley_radius': ((0.0024,), (0.1,)),
     'pretension': ((4.7,), (0.1,)),
@@ -39,12 +41,16 @@ PRIORS: Mapping[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
     'motor_bandwidth': ((30.0,), (0.03,)),
     'friction_profile': ((0.0, 0.0, 0.0), (0.5, 0.5, 0.3)),
     'load_cell_offset': ((0.0, 0.0), (0.5, 0.5)),
-    'load_cell_delay': ((0.07,), (0.005,)),
+    'load_cell_delay': ((0.07,), (0.03,)),
     'tracker_delay': ((0.0125,), (0.003,)),
 }
 """What is fitted: where the search begins, in the numbers of a family, and how far off each may be
 (of positive keys: of the logarithm). Servo and delays hold what is known of the recordings:
-the load cells' filter and period take 46 ms and, on average, 25 ms; the tracker holds for 25 ms."""
+the load cells' filter and period take 46 ms and, on average, 25 ms, and what else a reading waits
+for is not known; the tracker holds for 25 ms."""
+FITTED_CYCLES = 1.3
+"""A cycle from rest never shows the rise from the other side, on which friction that grows with the
+bend, and what imitates it, differ."""
 ANGLE_SCALE = math.radians(1.0)
 TENSION_SCALE = 0.27
 LEAST_SCALE, MOST_SCALE = 0.06, 0.18
@@ -55,7 +61,7 @@ _SCORED_EVERY = 2
 _REACH = 4.0
 _STEP = 0.03
 _OFF = 0.15
-_LINES = tuple(PRIORS)[:12]
+_LINES = tuple(PRIORS)[:14]
 _SIGNED = (*SIGNED, 'friction_profile', 'load_cell_offset', 'load_cell_delay', 'tracker_delay')
 _JOINT = 'bend_x'
 CYCLE_S = 2.0 * np.pi
@@ -81,6 +87,16 @@ class TubeRecording:
     def cycle(self, number: int) -> slice:
         """Samples of a cycle, the first being 1."""
         return slice(*self.cycles[number - 1 : number + 1])
+
+    @property
+    def fitted(self) -> slice:
+        """Samples that a family is fitted on: both branches of the loop."""
+        return slice(0, round(FITTED_CYCLES * self.cycles[1]))
+
+    @property
+    def judged(self) -> slice:
+        """Samples after those, to the end of the last cycle."""
+        return slice(self.fitted.stop, self.cycles[-1])
 
     def until(self, sample: int) -> TubeRecording:
         """The recording before a sample."""
@@ -121,7 +137,7 @@ def figures(desired: Array, angle: Array, tension: Array) -> TubeFigures:
 
 @dataclass(frozen=True)
 class Misfit:
-    """RMS left of a cycle: angle in rad, tensions (2,) in N."""
+    """RMS left: angle in rad, tensions (2,) in N."""
 
     angle: float
     tension: Array
@@ -145,10 +161,9 @@ def read(family: TubeFamily, bend: float, desired: Array, tick: float) -> tuple[
     return angle, np.stack(wires, axis=1)
 
 
-def misfit(family: TubeFamily, recording: TubeRecording, number: int) -> Misfit:
-    """What a family leaves of one cycle of a recording."""
+def misfit(family: TubeFamily, recording: TubeRecording, part: slice) -> Misfit:
+    """What a family leaves of some samples of a recording."""
     angle, tension = read(family, recording.bend, recording.desired, recording.tick)
-    part = recording.cycle(number)
     return Misfit(
         float(np.sqrt(np.mean((angle - recording.angle)[part] ** 2))),
         np.sqrt(np.mean((tension - recording.tension)[part] ** 2, axis=0)),

@@ -20,7 +20,7 @@ from endoscope_lab.identification.family_fit import (
 )
 
 LEFT = """\
-left, rms: angle in deg, tensions of both wires in N; first cycle (fitted) | second (judged)
+left, rms: angle in deg, tensions of both wires in N; 1.3 cycles (fitted) | the rest (judged)
 tube   family                            friction lumped at the ends"""
 BESIDE = """\
 
@@ -51,8 +51,8 @@ def identified(
     command: str,
     say: Callable[[str], None],
 ) -> IdentifiedFamily:
-    """Fit family and lumped plant to the first cycles."""
-    first = [recording.until(recording.cycles[1]) for recording in recordings]
+    """Fit family and lumped plant to the first 1.3 cycles."""
+    first = [recording.until(recording.fitted.stop) for recording in recordings]
     say(f'{len(first)} tubes: the family')
     family = fit_family(first, seed=seed)
     say('friction lumped at the ends')
@@ -60,7 +60,9 @@ def identified(
     left: dict[str, Any] = {
         f'{_bend(recording)} deg': [
             [round(misfits.angle / _RAD, 2), *np.round(misfits.tension, 2).tolist()]
-            for misfits in (misfit(family, recording, number) for number in (1, 2))
+            for misfits in (
+                misfit(family, recording, part) for part in (recording.fitted, recording.judged)
+            )
         ]
         for recording in recordings
     }
@@ -68,8 +70,8 @@ def identified(
         **RECORDED,
         'date': datetime.now(UTC).date().isoformat(),
         'command': command,
-        'fitted_on': 'first cycle of every tube, all together',
-        'left (deg and N of both wires, rms; first cycle, second cycle)': left,
+        'fitted_on': '1.3 cycles of every tube, all together',
+        'left (deg and N of both wires, rms; 1.3 cycles, the rest)': left,
     }
     return IdentifiedFamily(replace(family, provenance=provenance), lumped)
 
@@ -80,7 +82,9 @@ def table(recordings: Sequence[TubeRecording], found: IdentifiedFamily) -> str:
     for recording in recordings:
         plants = []
         for family in (found.family, found.lumped):
-            cycles = [misfit(family, recording, number) for number in (1, 2)]
+            cycles = [
+                misfit(family, recording, part) for part in (recording.fitted, recording.judged)
+            ]
             plants.append(
                 ' | '.join(
                     f'{m.angle / _RAD:4.2f} {m.tension[0]:.2f} {m.tension[1]:.2f}' for m in cycles

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.effects import CATALOGUE, KNOWN
 from endoscope_explain.decide.decision import decide
 from endoscope_explain.explanation import NINETY_PERCENT
 from endoscope_explain.fit.evidence import log_evidence
@@ -16,15 +16,14 @@ from endoscope_explain.fit.intervals import FORMS, with_form
 from endoscope_explain.fit.model import Fit, JointModel, jacobian, without_effect
 from endoscope_explain.fit.pooled import deviations, fit_together
 from endoscope_explain.observe.observation import JointObservation
-from endoscope_explain.search.levels import search
+from endoscope_explain.search.levels import Level, search
+from endoscope_lab.identification.family_fit import FITTED_CYCLES
 from endoscope_lab.real.rig import OF_TUBE, Plant, Told, as_described, best_refitted, wide
 from endoscope_lab.real.takes import OTHERS, STATE, TIGHTENED, TUBES, UNKNOWN_TUBES, read
 
 Array = NDArray[np.float64]
 Tell = Callable[[str], None]
 
-FITTED_CYCLES = 2.0
-"""Of recordings of an unknown tube."""
 MOST_EFFECTS = 3
 ROUNDS = 4
 """Pooled fits, each begun where the one before ended."""
@@ -38,19 +37,23 @@ Number = tuple[float, float, float]
 class Tubes:
     """The five tubes."""
 
-    told: tuple[Told, ...]  # judged on the second cycle
+    told: tuple[Told, ...]  # judged on what was not fitted
     # Missing from all of them together; where none can be named, the best one.
     effects: tuple[str, ...]
     named: bool  # the effects are named
     search: tuple[str, ...]  # what it said
+    levels: tuple[Level, ...]  # what it tried
     wide: tuple[Fit, ...]
     explained: tuple[Fit, ...]
 
 
 def explained_tubes(folder: Path, jobs: int, tell: Tell) -> Tubes:
-    """Fit all tubes together on their first cycle, and search what they lack."""
+    """Fit all tubes together on their first 1.3 cycles, and search what they lack."""
     takes = [read(folder / f'{name}.txt') for name in TUBES]
-    models = [wide(take.until(take.cycle_s).observation()) for take in takes]
+    fitted_s = [FITTED_CYCLES * take.cycle_s for take in takes]
+    models = [
+        wide(take.until(end).observation()) for take, end in zip(takes, fitted_s, strict=True)
+    ]
     starts = [as_described(model) for model in models]
     fits = fit_together(models, starts)
     for _ in range(ROUNDS - 1):
@@ -67,8 +70,8 @@ def explained_tubes(folder: Path, jobs: int, tell: Tell) -> Tubes:
     chosen = tried.found if named else tried.levels[-1].best
     explained = chosen.fits
     told = []
-    for take, model, start, before, after in zip(
-        takes, models, starts, fits, explained, strict=True
+    for take, end, model, start, before, after in zip(
+        takes, fitted_s, models, starts, fits, explained, strict=True
     ):
         whole = take.observation()
         plants = {
@@ -76,9 +79,17 @@ def explained_tubes(folder: Path, jobs: int, tell: Tell) -> Tubes:
             'refitted': Plant.of(before).on(whole),
             'augmented': Plant.of(after).on(whole),
         }
-        told.append(Told(take, take.cycle_s, plants))
+        told.append(Told(take, end, plants))
     search_said = tuple(text for text in said if 'nats' in text)
-    return Tubes(tuple(told), chosen.effects, named, search_said, tuple(fits), tuple(explained))
+    return Tubes(
+        tuple(told),
+        chosen.effects,
+        named,
+        search_said,
+        tried.levels,
+        tuple(fits),
+        tuple(explained),
+    )
 
 
 def _as_fit(model: JointModel, theta: Array) -> Fit:
@@ -128,7 +139,7 @@ def explained_state(folder: Path, tubes: Tubes, jobs: int, tell: Tell) -> State:
     after = best_refitted([begun(f) for f in (known[0], known[-1])])
     needed = {}
     for effect in tubes.effects:
-        if after.model.flags[CATALOGUE[effect].flag]:
+        if after.model.flags[KNOWN[effect].flag]:
             lesser = Plant(*without_effect(after, effect)).refitted()
             needed[effect] = log_evidence(after) - log_evidence(lesser)
     told = [Told(take, 0.0, _plants(before, after, observation))]
@@ -148,7 +159,7 @@ def explained_state(folder: Path, tubes: Tubes, jobs: int, tell: Tell) -> State:
 
 
 def _has_all(found: Fit, effects: Sequence[str]) -> bool:
-    return all(found.model.flags[CATALOGUE[e].flag] for e in effects)
+    return all(found.model.flags[KNOWN[e].flag] for e in effects)
 
 
 def _plants(before: Fit, after: Fit, seen: JointObservation) -> dict[str, Plant]:
@@ -162,7 +173,7 @@ def _plants(before: Fit, after: Fit, seen: JointObservation) -> dict[str, Plant]
 
 def unknown_tubes(folder: Path, tubes: Tubes, tell: Tell) -> list[Told]:
     """Recordings of tubes that nobody described: only a tube's numbers are refitted."""
-    # Every tube is tried as a start; the first cycles are fitted, the others are judged.
+    # Every tube is tried as a start; 1.3 cycles are fitted, the others are judged.
     found = []
     for name in UNKNOWN_TUBES:
         tell(f'{name}: refitting the tube')

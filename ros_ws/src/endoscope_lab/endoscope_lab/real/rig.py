@@ -24,14 +24,18 @@ ASYMMETRY = 0.0415
 with the cosine is 27 um at 60 deg."""
 ZERO = 'load_cell_bias'
 """The zero of the first cell was never checked: slack, it still reads 0.8 N. It is fitted."""
+AGE = 'load_cell_delay'
+"""What a reading of the cells waits for beyond what the rig's program says is not known."""
 PLANT = PlantDescription(
     {JOINT: JointParameters()},
     effects=(
         EffectSpec('wire_geometry', JOINT, {'asymmetry': ASYMMETRY}),
         EffectSpec(ZERO, JOINT, {'bias_n': 0.0, 'wire': 0.0}),
+        EffectSpec(AGE, JOINT, {'delay_s': 0.0}),
     ),
 )
-"""As described: the project's nominal tube, with the rig's kinematics."""
+"""As described: a nominal tube whose bending section has no friction of its own, with the rig's
+kinematics and cells."""
 SERVO = ('motor_bandwidth', 'motor_damping_ratio')
 """The motors' currents show their lag, 55 to 92 ms, so that these keep the usual tolerance."""
 BAND = 3.0
@@ -70,7 +74,7 @@ def wide(observation: JointObservation) -> JointModel:
         mean=math.log(centre),
     )
     # Derivatives are taken on the same ticks.
-    free += [radius, *effect_parameters(ZERO)]
+    free += [radius, *effect_parameters(ZERO), *effect_parameters(AGE)]
     return JointModel(observation, base, flags, tuple(free), coarse=1)
 
 

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from endoscope_core.physics.description import NUMBERS, JointParameters
-from endoscope_core.physics.effect import NominalPhysics, Parameter, Stage
+from endoscope_core.physics.description import NUMBERS, SLAVE
+from endoscope_core.physics.effect import NominalPhysics, Parameter, Stage, Traits
 
 RIGID = 1e7
 """N/m: a wire that does not stretch."""
@@ -13,7 +13,7 @@ AT_ONCE = 1e4
 
 def _searched(key: str, low: float, high: float, **more: Any) -> Parameter:
     """A nominal parameter with the bounds of a search; `more` as in `Parameter`."""
-    return Parameter(key, NUMBERS[key].unit, low, high, getattr(JointParameters, key), **more)
+    return Parameter(key, NUMBERS[key].unit, low, high, getattr(SLAVE, key), **more)
 
 
 NominalPhysics(
@@ -87,4 +87,20 @@ NominalPhysics(
         _searched('joint_friction', 0.0, 0.1, off=0.0, starts=(3e-4, 9e-4, 2.7e-3), scale=9e-4),
         _searched('joint_presliding', 1e-3, 1.0),
     ),
+)
+NominalPhysics(
+    'section_friction',
+    Stage.JOINT,
+    3,
+    physics='The bending section takes tension from the wire on the inside of its bend, the more '
+    'the further it is bent.',
+    equation='moment = +-r T (1 - exp(-section_friction (q - section_straight_angle) z)), T of the '
+    'wire inside, r = joint_radius, z as of the friction of the joint',
+    source='Kaneko et al., IEEE ICRA 1991; Feliu-Talegon et al. 2025',
+    parameters=(
+        _searched('section_friction', 0.0, 3.0, off=0.0, starts=(0.1, 0.3, 0.9), scale=0.3),
+        _searched('section_straight_angle', -1.0, 1.0),
+    ),
+    traits=Traits(families=('joint_friction_of_angle',)),
+    in_every_rig=False,
 )
