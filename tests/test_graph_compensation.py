@@ -11,7 +11,7 @@ from endoscope_core.metrics import tracking_rmse
 from endoscope_core.signals import periodic_signal
 from endoscope_core.signals.command_file import write_command_file
 
-SIGNAL = periodic_signal(2.5 * np.pi)
+SIGNAL = periodic_signal(2.5 * np.pi).scaled(0.7)
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ def motion_file(tmp_path):
 
 
 def track(graph, desired, measured):
-    """RMSE in rad of the tracker's angle, both joints, over the steady part of ``60 sin t``."""
+    """RMSE in rad of the tracker's angle, both joints, over the steady part of ``42 sin t``."""
     graph.set('master', source='none')
     graph.advance(0.3)
     desired.clear()
@@ -39,11 +39,11 @@ def track(graph, desired, measured):
     return tracking_rmse([wanted[m.stamp_ns] for m in inside], [m.position for m in inside])
 
 
-def test_feed_forward_and_feedback_reduce_the_error_of_60_sin_t(tmp_path, motion_file):
+def test_feed_forward_and_feedback_reduce_the_error_of_42_sin_t(tmp_path, motion_file):
     """In a tube half-way between two classes, on a rig that nothing was trained with.
 
-    60 deg are about all that this tube allows. Bouc-Wen leaves 31 % of the error, the physical
-    inverse of the plant that the calibration identified 7 %, and 6 % with feedback.
+    Further than that this tube does not bend both ways. Bouc-Wen leaves 18 % of the error, the
+    physical inverse of the plant that the calibration identified 5 % with feedback.
     """
     overrides = tube_of_size(tmp_path, 65, 903)
     overrides |= {'compensator': {'mode': 'none'}, 'controller': {'active': False}}
@@ -59,8 +59,8 @@ def test_feed_forward_and_feedback_reduce_the_error_of_60_sin_t(tmp_path, motion
         graph.set('controller', active=True)
         physical = track(graph, *streams)
     assert np.degrees(uncompensated) > 15.0
-    assert bouc_wen <= 0.40 * uncompensated
-    assert physical <= 0.10 * uncompensated
+    assert bouc_wen <= 0.25 * uncompensated
+    assert physical <= 0.08 * uncompensated
 
 
 def test_every_mode_comes_in_while_moving_without_a_jump(tmp_path):

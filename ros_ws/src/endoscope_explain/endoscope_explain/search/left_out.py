@@ -38,18 +38,16 @@ def likelihoods(fits: Sequence[Fit]) -> Array:
 
 
 def chance(gains: Array) -> float:
-    """Chance of gains (n,) as large on average where the mean of all recordings' is none."""
-    # Student's test of paired differences: recordings are independent, their samples are not.
+    """Chance of gains (n,) like these where what was added is worth nothing."""
+    # Student's test of paired differences, for recordings are independent and their samples are
+    # not. Where each recording gains, but one much more than another, it says little; there the
+    # chance that the weakest of them gains as much bounds it: a likelihood ratio is larger than its
+    # inverse by no more chance than that (Ville's inequality).
     scatter = float(np.std(gains, ddof=1)) / np.sqrt(len(gains))
     if scatter == 0.0:
         return 0.0 if np.mean(gains) > 0.0 else 1.0
-    return float(student.sf(np.mean(gains) / scatter, len(gains) - 1))
-
-
-def assured(gains: Array, false_alarms: float) -> float:
-    """Least gain in nats on average of gains (n,), but for a chance of false alarms."""
-    scatter = float(np.std(gains, ddof=1)) / np.sqrt(len(gains))
-    return float(np.mean(gains) - student.isf(false_alarms, len(gains) - 1) * scatter)
+    by_mean = float(student.sf(np.mean(gains) / scatter, len(gains) - 1))
+    return min(by_mean, float(np.exp(min(0.0, -np.min(gains)))))
 
 
 def repeat_one_motion(observations: Sequence[JointObservation]) -> bool:

@@ -25,7 +25,7 @@ from endoscope_explain.search.expansion import (
     first_of_each,
     screen_terms,
 )
-from endoscope_explain.search.left_out import LEAST_RECORDINGS, assured, chance
+from endoscope_explain.search.left_out import LEAST_RECORDINGS, chance
 from endoscope_explain.search.null_rigs import (
     NO_DETECTABLE_GAIN,
     Null,
@@ -258,7 +258,11 @@ def _by_left_out(first: Candidate, ranked: Sequence[Candidate], jobs: int) -> Le
     """A level whose candidates are judged in recordings that were left out."""
     settled = parallel_map(converged, ranked, jobs)
     gains = [each.foretold - first.foretold for each in settled]
-    order = np.argsort([-assured(each, FALSE_ALARMS) for each in gains], kind='stable')
+    # What all recordings confirm is first, then what is worth more to all of them.
+    order = sorted(
+        range(len(settled)),
+        key=lambda k: (chance(gains[k]) > FALSE_ALARMS, -float(np.sum(gains[k]))),
+    )
     found = tuple(settled[k] for k in order)
     return Level(first, found, NO_DETECTABLE_GAIN, by_left_out=True)
 

@@ -14,11 +14,11 @@ from endoscope_explain.explanation import NINETY_PERCENT
 from endoscope_explain.fit.evidence import log_evidence
 from endoscope_explain.fit.intervals import FORMS, with_form
 from endoscope_explain.fit.model import Fit, JointModel, jacobian, without_effect
-from endoscope_explain.fit.pooled import deviations, fit_together
+from endoscope_explain.fit.pooled import deviations, fit_together, judged_alone
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.search.levels import Level, search
 from endoscope_lab.identification.family_fit import FITTED_CYCLES
-from endoscope_lab.real.rig import OF_TUBE, Plant, Told, as_described, best_refitted, wide
+from endoscope_lab.real.rig import Plant, Told, as_described, best_refitted, wide
 from endoscope_lab.real.takes import OTHERS, STATE, TIGHTENED, TUBES, UNKNOWN_TUBES, read
 
 Array = NDArray[np.float64]
@@ -133,10 +133,12 @@ def explained_state(folder: Path, tubes: Tubes, jobs: int, tell: Tell) -> State:
     def begun(found: Fit) -> Plant:
         return Plant.of(found).on(observation).with_cell_of_unknown_unit()
 
-    before = best_refitted([begun(f) for f in (tubes.wide[0], tubes.wide[-1])])
+    # The instrument is the tubes'.
+    before = best_refitted([begun(f) for f in judged_alone(tubes.wide)])
     tell(f"{take.name}: explaining it by the tubes' effects")
-    known = [f for f in tubes.explained if _has_all(f, tubes.effects)] or list(tubes.explained)
-    after = best_refitted([begun(f) for f in (known[0], known[-1])])
+    explained = judged_alone(tubes.explained)
+    known = [f for f in explained if _has_all(f, tubes.effects)] or explained
+    after = best_refitted([begun(f) for f in known])
     needed = {}
     for effect in tubes.effects:
         if after.model.flags[KNOWN[effect].flag]:
@@ -172,7 +174,11 @@ def _plants(before: Fit, after: Fit, seen: JointObservation) -> dict[str, Plant]
 
 
 def unknown_tubes(folder: Path, tubes: Tubes, tell: Tell) -> list[Told]:
-    """Recordings of tubes that nobody described: only a tube's numbers are refitted."""
+    """Recordings of tubes that nobody described.
+
+    The instrument is that of the five tubes; a tube's own numbers are refitted, and what scatters
+    from tube to tube, drawn to their mean.
+    """
     # Every tube is tried as a start; 1.3 cycles are fitted, the others are judged.
     found = []
     for name in UNKNOWN_TUBES:
@@ -183,7 +189,7 @@ def unknown_tubes(folder: Path, tubes: Tubes, tell: Tell) -> list[Told]:
         model = wide(whole)
         plants = {'nominal': Plant(model, as_described(model))}
         for key, fits in (('refitted', tubes.wide), ('augmented', tubes.explained)):
-            starts = [Plant.of(f).held(OF_TUBE, part) for f in fits]
+            starts = [Plant.of(f).on(part) for f in judged_alone(fits)]
             plants[key] = Plant.of(best_refitted(starts)).on(whole)
         found.append(Told(take, begin, plants))
     return found

@@ -40,16 +40,6 @@ SERVO = ('motor_bandwidth', 'motor_damping_ratio')
 """The motors' currents show their lag, 55 to 92 ms, so that these keep the usual tolerance."""
 BAND = 3.0
 """Of all others: they may be five times the described ones, or a fifth."""
-OF_TUBE = (
-    'pretension',
-    'pretension_profile',
-    'capstan_exponent',
-    'friction_profile_1',
-    'friction_profile_2',
-    'friction_profile_3',
-    'joint_rest_angle',
-)
-"""What another shape of the tube changes, tightened again."""
 STANDS, STEPS = 1e-5, 60
 """Share of the cost, and steps, after which a fit of one recording ends."""
 

@@ -124,6 +124,10 @@ def worth_rows(tubes: Tubes) -> Rows:
     return rows
 
 
+UNKNOWN = (
+    "The instrument is that of the five tubes. A tube's own numbers, and what scatters from tube "
+    'to tube, were fitted again on 1.3 cycles; the rest is judged.'
+)
 WORTH = (
     'Nats of the evidence of all tubes, and of each tube where it was left out: the others say '
     'what the instrument is, what scatters is refitted to three quarters of its blocks, the fourth '
@@ -176,7 +180,7 @@ def sections(
         ),
         (
             'Another state of the rig, numbers',
-            f"By the tubes' effects; nats lost without each: {needed}. Alone it names {alone}.",
+            f"The instrument is the tubes'. Nats lost without: {needed}. Alone it names {alone}.",
             ('number', state.told[0].take.name),
             number_rows(of_state),
             (),
@@ -190,7 +194,7 @@ def sections(
         ),
         (
             'Unknown tubes',
-            "Only the tube's numbers were refitted, on 1.3 cycles; the rest is judged.",
+            UNKNOWN,
             plain,
             rmse_rows(unknown),
             unknown,
