@@ -217,6 +217,8 @@ def _told(level: Level) -> str:
         return f'{names}, better by {gain:.0f} nats'
     if not level.predicts:
         return f'not {names}: better by {gain:.0f} nats, but not on what it was not fitted to'
+    if level.by_left_out:
+        return f'not {names}: better by {gain:.0f} nats, but not in recordings that are left out'
     share = f'{level.p_value:.1%} of rigs without it show as much'
     return f'not {names}: better by {gain:.0f} nats, but {share}'
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
 from endoscope_core.atomic_output import write_text
-from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics.effects import CATALOGUE, KNOWN
 from endoscope_explain.decide.conclusions import NOMINAL_UNITS
 from endoscope_explain.report.numbers import PLANTS as LABEL
 from endoscope_explain.report.numbers import digits, in_degrees
@@ -44,16 +44,19 @@ def run(args: argparse.Namespace) -> int:
         tubes = explained_tubes(args.folder, args.jobs, report)
         state = explained_state(args.folder, tubes, args.jobs, report)
         unknown = unknown_tubes(args.folder, tubes, report)
+        box = prandtl_ishlinskii.left(real_recordings(args.folder), FITTED_CYCLES)
         parts = sections(
             tubes,
             numbers(tubes.explained, args.jobs),
-            prandtl_ishlinskii.left(real_recordings(args.folder), FITTED_CYCLES),
+            box,
             state,
             numbers([state.fit], args.jobs),
             unknown,
         )
     print(as_text(parts))
-    write_text(args.out, page(parts))
+    picture = five_loops(tubes)
+    write_text(args.out, page(parts, picture, in_short(tubes, box)))
+    write_text(args.out.with_suffix('.svg'), picture)
     print(f'\nPage: {args.out}')
     return 0
 
@@ -210,13 +213,64 @@ def as_text(parts: Iterable[Section]) -> str:
     )
 
 
-def page(parts: Sequence[Section]) -> str:
+def in_short(tubes: Tubes, box: Mapping[str, float]) -> dict[str, object]:
+    """What the page says first: mean rms of the angle that was not fitted, deg."""
+
+    def mean(radians: Iterable[float]) -> float:
+        return float(np.rad2deg(np.mean([*radians])))
+
+    between = mean(between_cycles(one.take)[0] for one in tubes.told)
+    after = mean(one.left('augmented')[0] for one in tubes.told)
+    return {
+        'named': tubes.named,
+        'names': ' and '.join(KNOWN[e].physics.rstrip('.') for e in tubes.effects),
+        'before': f'{mean(one.left("refitted")[0] for one in tubes.told):.2f}',
+        'after': f'{after:.2f}',
+        'between': f'{between:.2f}',
+        'ratio': f'{after / between:.2f}',
+        'box': f'{mean(box.values()):.2f}',
+    }
+
+
+def five_loops(tubes: Tubes) -> str:
+    """The last loop of each tube as measured, without and with what was missing (SVG)."""
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(11.0, 2.9), layout='constrained')
+        axes = figure.subplots(1, len(tubes.told), sharey=True)
+        for axis, told in zip(axes, tubes.told, strict=True):
+            channel = told.plants['refitted'].model.observation.channels[-1]
+            seen = channel.time >= channel.time[-1] - told.take.cycle_s
+            command = np.rad2deg(np.interp(channel.time, told.take.time, told.take.command))
+            for label, values, colour, width in (
+                ('measured', channel.value, '#b8c1cc', 4.0),
+                ('simulated', told.plants['refitted'].predicted()[-1], LINE['nominal'][1], 1.2),
+                (
+                    'simulated, with what was missing',
+                    told.plants['augmented'].predicted()[-1],
+                    LINE['augmented'][1],
+                    1.2,
+                ),
+            ):
+                axis.plot(
+                    command[seen], np.rad2deg(values[seen]), color=colour, lw=width, label=label
+                )
+            axis.set_title(f'tube bent by {told.take.name} deg')
+            axis.set_xlabel('command (deg)')
+        axes[0].set_ylabel('angle of the tip (deg)')
+        handles = axes[0].get_legend_handles_labels()
+        figure.legend(*handles, loc='outside lower center', ncols=3)
+        return svg(figure)
+
+
+def page(parts: Sequence[Section], hero: str, story: Mapping[str, object]) -> str:
     """A page that needs no other file."""
     shown = [
         (title, words, html_table(header, rows, words=1), [loops(one, header[3]) for one in told])
         for title, words, header, rows, told in parts
     ]
-    return render_page('endoscope_lab', 'real/templates/real.html.j2', sections=shown)
+    return render_page(
+        'endoscope_lab', 'real/templates/real.html.j2', sections=shown, hero=hero, **story
+    )
 
 
 def loops(told: Told, last: str) -> str:
