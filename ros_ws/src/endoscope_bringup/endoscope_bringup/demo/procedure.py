@@ -88,8 +88,8 @@ MOTION_TITLE = {'periodic': '60 sin t', 'non_periodic': '30 sin t + 30 sin √3 
 # Tubes of the recorded family whose backlash under 60 sin(t) deg is that of Table 5 without
 # compensation, 50 and 68 deg: by that signal, not by the calibration's.
 TUBES = (
-    Tube('descending colon', math.radians(33.0)),
-    Tube('transverse colon', math.radians(133.0)),
+    Tube('descending colon', math.radians(50.0)),
+    Tube('transverse colon', math.radians(150.0)),
 )
 
 # First paper, Table 5: (tube, motion) -> RMSE none, RMSE proposed, backlash none, proposed.
