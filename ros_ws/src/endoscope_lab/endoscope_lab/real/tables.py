@@ -269,7 +269,7 @@ def page(parts: Sequence[Section], hero: str, story: Mapping[str, object]) -> st
         for title, words, header, rows, told in parts
     ]
     return render_page(
-        'endoscope_lab', 'real/templates/real.html.j2', sections=shown, hero=hero, **story
+        'endoscope_lab', 'real/templates/real.html.j2', sections=shown, hero=hero, story=story
     )
 
 
