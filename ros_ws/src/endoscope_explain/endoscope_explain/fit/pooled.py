@@ -122,11 +122,7 @@ def judged_alone(fits: Sequence[Fit]) -> list[Fit]:
     means = {int(place): float(np.mean(whole[pool])) for pool in layout.pools for place in pool}
     alone = []
     for found, columns in zip(fits, layout.columns, strict=True):
-        model = found.model
-        base, _ = model.packed(found.theta)
-        kept = [k for k, item in enumerate(model.free) if item.index not in _OF_A_DEVICE]
-        free = tuple(_drawn_to(model.free[k], means.get(int(columns[k]))) for k in kept)
-        told = replace(model, base=base, free=free)
+        told, kept = _alone(found.model, found.theta, columns, means)
         theta = found.theta[kept]
         cost = told.cost(found.residuals, theta)
         alone.append(
@@ -169,8 +165,8 @@ def foretold(fits: Sequence[Fit]) -> list[Array]:
             for pool, theirs_of in zip(layout.pools, pools, strict=True)
             for place in pool
         }
-        told, theta = _alone(own.model, moved[columns], columns, means)
-        residuals = own.residuals.copy()
+        told, free = _alone(own.model, moved[columns], columns, means)
+        theta, residuals = moved[columns][free], own.residuals.copy()
         for fitted, judged in folds(own.model.observation.times):
             again = fit(told, theta, fitted * weight[left_out], *FORETOLD)
             residuals[judged] = again.residuals[judged]
@@ -181,12 +177,12 @@ def foretold(fits: Sequence[Fit]) -> list[Array]:
 
 def _alone(
     model: JointModel, theta: Array, columns: Indices, means: Mapping[int, float]
-) -> tuple[JointModel, Array]:
-    """A recording's model with devices held, and its coordinates, pooled ones drawn to means."""
+) -> tuple[JointModel, list[int]]:
+    """A recording's model with devices held and pooled numbers drawn to means; what stays free."""
     base, _ = model.packed(theta)
     kept = [k for k, item in enumerate(model.free) if item.index not in _OF_A_DEVICE]
     free = tuple(_drawn_to(model.free[k], means.get(int(columns[k]))) for k in kept)
-    return replace(model, base=base, free=free), theta[kept]
+    return replace(model, base=base, free=free), kept
 
 
 def _laid_out(fits: Sequence[Fit]) -> tuple[_Layout, Array]:
