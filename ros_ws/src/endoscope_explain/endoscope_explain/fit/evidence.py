@@ -120,8 +120,12 @@ REFIT_STEPS = 2
 def judged_at(time: Array) -> Mask:
     """Tell which samples (N,) are held out, by their time in s from the first command."""
     # All are where there is no whole held-out block.
-    inside = np.mod(time, BLOCK_S * EVERY) >= BLOCK_S * (EVERY - 1)
+    inside = _in_last_block(time)
     return inside if inside.any() else np.ones_like(inside)
+
+
+def _in_last_block(time: Array) -> Mask:
+    return np.asarray(np.mod(time, BLOCK_S * EVERY) >= BLOCK_S * (EVERY - 1))
 
 
 def fitted_at(time: Array) -> Mask:
@@ -135,7 +139,7 @@ def folds(time: Array) -> list[tuple[Mask, Mask]]:
     found = []
     for shift in range(EVERY):
         moved = time + BLOCK_S * (EVERY - 1 - shift)
-        judged = np.mod(moved, BLOCK_S * EVERY) >= BLOCK_S * (EVERY - 1)
+        judged = _in_last_block(moved)
         if judged.any():
             found.append((fitted_at(moved), judged))
     return found

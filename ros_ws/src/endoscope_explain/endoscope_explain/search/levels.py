@@ -113,10 +113,10 @@ class Level:
     @property
     def is_found(self) -> bool:
         """Whether something is missing, and found."""
-        # Nominal physics needs no more than to be worth its numbers: that a rig has none is no
-        # hypothesis.
         if self.by_left_out:
             return self.p_value <= FALSE_ALARMS
+        # Nominal physics needs no more than to be worth its numbers: that a rig has none is no
+        # hypothesis.
         if self.found and self.best.adds_nominal:
             return self.gain(self.best) > 0.0 and self.predicts
         return self.p_value <= FALSE_ALARMS and self.predicts
@@ -131,11 +131,8 @@ class Level:
     def rivals(self) -> tuple[Candidate, ...]:
         """Candidates behind the best one by no more than form is worth."""
         if self.by_left_out:
-            best = self.best
-            behind = {
-                id(c): chance(best.foretold - c.foretold) for c in self.found if c is not best
-            }
-            return tuple(c for c in self.found if behind.get(id(c), 0.0) > FALSE_ALARMS)
+            best, *behind = self.found
+            return tuple(c for c in behind if chance(best.foretold - c.foretold) > FALSE_ALARMS)
         least = self.found[0].evidence - self.form_is_worth()
         return tuple(c for c in self.found if c is not self.best and c.evidence >= least)
 
