@@ -10,10 +10,10 @@ from scipy.stats import t
 from endoscope_core.physics.layout import IN_COMMAND
 from endoscope_explain.case import Ladder
 from endoscope_explain.explanation import Explanation, NamedEffect
-from endoscope_explain.fit.evidence import BLOCK_S
 from endoscope_explain.observe.predicted_signals import RecordedView, fits_by, view
+from endoscope_explain.observe.revisits import BLOCK_S
 from endoscope_explain.recording import MOVES_RAD, Recording
-from endoscope_explain.search.levels import FALSE_ALARMS
+from endoscope_explain.search.judging import FALSE_ALARMS
 
 
 def confirmed_by(validation: Recording, explanation: Explanation) -> tuple[NamedEffect, ...]:

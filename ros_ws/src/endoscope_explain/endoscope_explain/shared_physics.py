@@ -5,7 +5,6 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
-from endoscope_core.physics.effects import describe
 from endoscope_explain.decide.decision import found_together
 from endoscope_explain.decide.given_physics import (
     GivenJoints,
@@ -60,11 +59,11 @@ def shared_effects(
         tried = search(references, jobs, most_effects, tell=tell)
         found = tried.found
         rivalries = {
-            term.name: Rivalry(term.alternatives, term.margin, term.form)
+            term.term.id: Rivalry(term.name, term.alternatives, term.margin, term.form)
             for term in found_together(tried, jobs)
         }
         for physics, own in zip(given, judged_alone(found.fits), strict=True):
-            # A recording that has no use for an effect lacks it.
-            there = tuple(e for e in found.effects if own.model.flags[describe(e).flag])
+            # A recording that has no use for a term lacks it.
+            there = tuple(t for t in found.terms if own.model.flags[t.effect.flag])
             physics[joint] = without_recording(there, own, rivalries)
     return list(given)

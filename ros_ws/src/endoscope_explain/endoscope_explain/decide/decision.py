@@ -127,8 +127,8 @@ def share_explained(nominal: Candidate, chosen: Candidate) -> float:
 
 def _instead(level: Level) -> tuple[str, ...]:
     """Terms that explain as much as other numbers do."""
-    least = level.best.evidence - level.form_is_worth()
-    near = [c for c in level.found if not level.adds_nothing(c) and c.evidence >= least]
+    others = [c for c in level.found if not level.adds_nothing(c)]
+    near = [c for c in others if level.judge.stands_for(c, level.best)]
     return tuple(dict.fromkeys(_name(level, each) for each in near))
 
 
@@ -155,7 +155,7 @@ def _missing(level: Level, best: Candidate, jobs: int) -> MissingTerm:
             name, formula = last.id, None
     margin = gain - max(best_other, 0.0)
     return MissingTerm(
-        last, name, alternatives, gain, margin, level.p_value, formula, level.form_is_worth()
+        last, name, alternatives, gain, margin, level.p_value, formula, level.judge.form_is_worth
     )
 
 

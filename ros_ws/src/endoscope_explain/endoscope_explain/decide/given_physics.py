@@ -2,17 +2,24 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.physics.effects import describe
 from endoscope_core.workers import parallel_map
 from endoscope_explain.decide.decision import Decision, MissingTerm, decide, share_explained
 from endoscope_explain.fit.evidence import log_evidence
+from endoscope_explain.fit.family import Family
 from endoscope_explain.fit.free_parameters import FreeParameter
-from endoscope_explain.fit.model import TO_THE_END, Fit, JointModel, fit, without_effect
+from endoscope_explain.fit.model import (
+    TO_THE_END,
+    Fit,
+    JointModel,
+    fit,
+    without_effect,
+    without_function,
+)
 from endoscope_explain.search.levels import JointSearch, Level, search
 from endoscope_explain.search.refit import SETTLED, Candidate, candidate
 from endoscope_explain.search.term import Term
@@ -23,26 +30,25 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Rivalry:
-    """What was tried in an effect's place where it was chosen."""
+    """What was tried in a term's place where it was chosen."""
 
+    name: str  # as in `MissingTerm`
     alternatives: tuple[str, ...]  # names that were not told from it, nearest first
     margin: float  # by how much more evidence in nats it has than the best other name
     form: float  # as in `MissingTerm`
-
-
-UNRIVALLED = Rivalry((), 0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class GivenPhysics:
     """A fitted joint without its recording."""
 
-    effects: tuple[str, ...]  # in the order in which they were added
+    terms: tuple[Term, ...]  # in the order in which they were added
     base: Array  # (parameters,)
     flags: Flags  # (flags,)
     free: tuple[FreeParameter, ...]  # as in `JointModel`
     theta: Array  # (n,)
-    # By effect; none where it was not chosen by a search.
+    families: tuple[Family, ...] = ()  # as in `JointModel`
+    # By id of the term; none where it was not chosen by a search.
     rivalries: Mapping[str, Rivalry] = field(default_factory=dict)
 
 
@@ -51,37 +57,47 @@ GivenJoints = Mapping[str, GivenPhysics]
 
 
 def without_recording(
-    effects: tuple[str, ...], found: Fit, rivalries: Mapping[str, Rivalry] | None = None
+    terms: tuple[Term, ...], found: Fit, rivalries: Mapping[str, Rivalry] | None = None
 ) -> GivenPhysics:
     """The physics of a fit."""
     model = found.model
     return GivenPhysics(
-        effects, model.base, model.flags, model.free, found.theta, dict(rivalries or {})
+        terms,
+        model.base,
+        model.flags,
+        model.free,
+        found.theta,
+        model.families,
+        dict(rivalries or {}),
     )
 
 
 def explained_by(
     references: tuple[Fit, Fit], given: GivenPhysics, jobs: int
 ) -> tuple[JointSearch, Decision]:
-    """Fit given physics to a joint, and see what each of its effects is needed for."""
-    # Each effect gains what the joint loses without it. One term more is searched only where they
+    """Fit given physics to a joint, and see what each of its terms is needed for."""
+    # Each term gains what the joint loses without it. One term more is searched only where they
     # leave more than another form would. The reference fits are the nominal plant refitted, and as
     # described.
     nominal = candidate((), references[0])
     found = references[0]
-    terms: tuple[Term, ...] = ()
     missing: tuple[MissingTerm, ...] = ()
-    if given.effects:
-        model = JointModel(references[0].model.observation, given.base, given.flags, given.free)
+    if given.terms:
+        model = JointModel(
+            references[0].model.observation,
+            given.base,
+            given.flags,
+            given.free,
+            families=given.families,
+        )
         found = fit(model, given.theta, iterations=TO_THE_END, tolerance=SETTLED)
-        terms = tuple(Term(describe(each)) for each in given.effects)
-        missing = _needed(candidate(terms, found), given, jobs)
+        missing = _needed(candidate(given.terms, found), given, jobs)
     beside = decide(JointSearch(candidate((), found), ()), jobs)
     tried: tuple[Level, ...] = ()
     if not beside.adequate:
         tried = search([(found,)], jobs, 1).levels
         beside = decide(JointSearch(candidate((), found), tried), jobs)
-    chosen = candidate((*terms, *beside.chosen.terms), beside.chosen.fit)
+    chosen = candidate((*given.terms, *beside.chosen.terms), beside.chosen.fit)
     everything = (*missing, *beside.missing)
     return JointSearch(nominal, tried), Decision(
         chosen, everything, share_explained(nominal, chosen)
@@ -89,15 +105,26 @@ def explained_by(
 
 
 def _needed(whole: Candidate, given: GivenPhysics, jobs: int) -> tuple[MissingTerm, ...]:
-    """Each given effect with what the joint loses without it, and its rivals where it has any."""
-    lesser = [without_effect(whole.fit, effect_id) for effect_id in given.effects]
+    """Each given term with what the joint loses without it, and its rivals where it has any."""
+    lesser = [
+        (without_function if term.is_function else without_effect)(whole.fit, term.id)
+        for term in whole.terms
+    ]
     fits = parallel_map(lambda less: fit(*less), lesser, jobs)
-    alone = tuple(
-        MissingTerm(term, term.id, (), whole.evidence - log_evidence(less), 0.0, math.nan, whole)
-        for term, less in zip(whole.terms, fits, strict=True)
-    )
-    rivalries = [given.rivalries.get(term.name, UNRIVALLED) for term in alone]
-    return tuple(
-        replace(term, alternatives=rivalry.alternatives, margin=rivalry.margin, form=rivalry.form)
-        for term, rivalry in zip(alone, rivalries, strict=True)
-    )
+    found = []
+    for term, less in zip(whole.terms, fits, strict=True):
+        rivalry = given.rivalries.get(term.id, Rivalry(term.id, (), 0.0, 0.0))
+        gain = whole.evidence - log_evidence(less)
+        found.append(
+            MissingTerm(
+                term,
+                rivalry.name,
+                rivalry.alternatives,
+                gain,
+                rivalry.margin,
+                math.nan,
+                None if term.is_function else whole,
+                rivalry.form,
+            )
+        )
+    return tuple(found)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from endoscope_explain.explanation import ChannelFit
 from endoscope_explain.fit.model import Fit, fit
 from endoscope_explain.observe.observation import WHITE, JointObservation
+from endoscope_explain.observe.revisits import held_out
 
 Array = NDArray[np.float64]
 
@@ -108,57 +109,22 @@ def _z(values: np.ndarray, independent: float) -> float:
     return float((np.mean(values**2) - 1.0) / np.sqrt(2.0 / max(independent, 1.0)))
 
 
-Mask = NDArray[np.bool_]
-
-BLOCK_S = 2.0
-EVERY = 4
-GAP_S = 0.2
-"""Left out on both sides of a held-out block, for the memory of wires and tracker."""
-REFIT_STEPS = 2
-
-
-def judged_at(time: Array) -> Mask:
-    """Tell which samples (N,) are held out, by their time in s from the first command."""
-    # All are where there is no whole held-out block.
-    inside = _in_last_block(time)
-    return inside if inside.any() else np.ones_like(inside)
-
-
-def _in_last_block(time: Array) -> Mask:
-    return np.asarray(np.mod(time, BLOCK_S * EVERY) >= BLOCK_S * (EVERY - 1))
-
-
-def fitted_at(time: Array) -> Mask:
-    """Tell which samples (N,) may be fitted or trained on: those far from a held-out block."""
-    phase = np.mod(time, BLOCK_S * EVERY)
-    return np.asarray((phase >= GAP_S) & (phase < BLOCK_S * (EVERY - 1) - GAP_S))
-
-
-def folds(time: Array) -> list[tuple[Mask, Mask]]:
-    """Samples (N,) that are fitted and that are judged, each sample judged once."""
-    found = []
-    for shift in range(EVERY):
-        moved = time + BLOCK_S * (EVERY - 1 - shift)
-        judged = _in_last_block(moved)
-        if judged.any():
-            found.append((fitted_at(moved), judged))
-    return found
+REFIT_STEPS, REFIT_TOLERANCE = 4, 1e-2
 
 
 def held_out_residuals(final: Fit) -> Array:
     """Residuals (size,) of a fit that has not seen the held-out blocks."""
-    time = final.model.observation.times
-    if judged_at(time).all():
+    fitted, judged = held_out(final.model.observation)
+    if judged.all():
         return final.residuals
-    weight = fitted_at(time) * weights(final.model.observation, final.residuals)
-    return fit(
-        final.model, final.theta, weight, REFIT_STEPS, known_jacobian=final.jacobian
-    ).residuals
+    weight = fitted * weights(final.model.observation, final.residuals)
+    steps = REFIT_STEPS, REFIT_TOLERANCE
+    return fit(final.model, final.theta, weight, *steps, final.jacobian).residuals
 
 
 def held_out_misfit(observation: JointObservation, residuals: Array) -> float:
     """Sum over the signals of the logarithm of their mean square on the held-out blocks."""
-    judged = judged_at(observation.times)
+    _, judged = held_out(observation)
     return sum(
         float(np.log(np.maximum(np.mean(residuals[part][judged[part]] ** 2), 1.0)))
         for part in observation.slices()
@@ -168,7 +134,7 @@ def held_out_misfit(observation: JointObservation, residuals: Array) -> float:
 
 def held_out_fit(observation: JointObservation, residuals: Array) -> dict[str, ChannelFit]:
     """What residuals (size,) leave of every signal on the held-out blocks."""
-    judged, result = judged_at(observation.times), {}
+    (_, judged), result = held_out(observation), {}
     for channel, part in zip(observation.channels, observation.slices(), strict=True):
         use = judged[part] if judged[part].any() else np.ones_like(judged[part])
         noise = channel.noise[use]

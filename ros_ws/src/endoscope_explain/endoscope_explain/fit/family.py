@@ -78,13 +78,17 @@ class Family:
             values = np.maximum(values, 0.0)
         return np.clip(values, -self.largest, self.largest)
 
+    @property
+    def size(self) -> float:
+        """Rms over the nodes of a function drawn from the prior."""
+        return float(np.sqrt(np.mean(np.sum(self.basis**2, axis=1))))
+
     def finer(self, count: int, visited: tuple[float, float] | None = None) -> 'Family':
         """Functions of the same place and size with more coefficients, over another range."""
-        size = np.sqrt(np.mean(np.sum(self.basis**2, axis=1)))
         found = family_at(self.place, visited or (self.low, self.high), count, self.band)
         assert found is not None
         found = replace(found, multiplies=self.multiplies, lag=self.lag)
-        return found.scaled(size / np.sqrt(np.mean(np.sum(found.basis**2, axis=1))))
+        return found.scaled(self.size / found.size)
 
     def details(self, generator: np.random.Generator) -> Array:
         """A function (NODES,) that varies faster than these do, drawn as they are."""

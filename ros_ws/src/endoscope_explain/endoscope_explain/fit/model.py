@@ -233,6 +233,21 @@ def without_effect(found: Fit, effect_id: str) -> tuple[JointModel, Array]:
     return replace(found.model, base=base, flags=flags).holding(definition.places, found.theta)
 
 
+def without_function(found: Fit, place_id: str) -> tuple[JointModel, Array]:
+    """Model and first coordinates (n,) of a fit that has lost its function at a place."""
+    model = found.model
+    which = [family.place.id for family in model.families].index(place_id)
+    place = model.families[which].place
+    flags = model.flags.copy()
+    flags[place.flag] = 0
+    gone = {*model.places_of_coefficients()[which].tolist()}
+    gone |= {k for k, item in enumerate(model.free) if item.index in place.places}
+    kept = [k for k in range(len(model.free)) if k not in gone]
+    families = (*model.families[:which], *model.families[which + 1 :])
+    free = tuple(model.free[k] for k in kept)
+    return replace(model, flags=flags, free=free, families=families), found.theta[kept]
+
+
 def jacobian(model: JointModel, theta: Array, columns: list[int] | None = None) -> Array:
     """Difference quotients (size, columns) of the residuals at `theta` (n,), on coarser ticks."""
     # What is left of the error of coarse ticks in a difference turns a step by a few per cent; a

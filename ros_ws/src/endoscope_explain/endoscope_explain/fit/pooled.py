@@ -22,10 +22,11 @@ from endoscope_core.physics.layout import (
     NOMINAL_KEYS,
     PROFILE_TERMS,
 )
-from endoscope_explain.fit.evidence import folds, weights
-from endoscope_explain.fit.free_parameters import LEAD, FreeParameter
+from endoscope_explain.fit.evidence import weights
+from endoscope_explain.fit.free_parameters import COEFFICIENT, LEAD, FreeParameter
 from endoscope_explain.fit.model import Fit, JointModel, central_jacobian, fit
 from endoscope_explain.fit.solver import STEP, Effort, Renewal, minimise
+from endoscope_explain.observe.revisits import folds
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -71,6 +72,7 @@ class _Layout:
     # (N,), bounds.
     low: Array
     high: Array
+    scale: Array  # (N,), of what a pooled coordinate scatters by, in `SPREAD`
 
 
 def fit_together(
@@ -202,7 +204,7 @@ def _drawn_to(item: FreeParameter, mean: float | None) -> FreeParameter:
     if mean is None:
         return item
     own = 0.0 if math.isinf(item.spread) else item.spread**-2
-    others = SPREAD**-2
+    others = (SPREAD * _scale(item)) ** -2
     return replace(
         item,
         mean=(own * item.mean + others * mean) / (own + others),
@@ -210,12 +212,18 @@ def _drawn_to(item: FreeParameter, mean: float | None) -> FreeParameter:
     )
 
 
+def _scale(item: FreeParameter) -> float:
+    """What a pooled coordinate scatters by, in `SPREAD`: a coefficient by a share of its prior."""
+    return item.spread if item.index == COEFFICIENT else 1.0
+
+
 def _layout(models: Sequence[JointModel]) -> _Layout:
     tied: dict[int, int] = {}
-    pools: dict[int, list[int]] = {}
+    pools: dict[tuple[int, str], list[int]] = {}
     columns: list[Indices] = []
     low: list[float] = []
     high: list[float] = []
+    scale: list[float] = []
     for model in models:
         lowest, highest = model.bounds()
         own = []
@@ -226,17 +234,20 @@ def _layout(models: Sequence[JointModel]) -> _Layout:
             place = len(low)
             low.append(float(lowest[k]))
             high.append(float(highest[k]))
+            scale.append(_scale(item))
             own.append(place)
             if item.index == LEAD or item.index in _OF_A_DEVICE:
                 tied[item.index] = place
             elif item.index not in _OF_A_SHAPE:
-                pools.setdefault(item.index, []).append(place)
+                # Coefficients of functions have one index, and a name each.
+                pools.setdefault((item.index, item.name), []).append(place)
         columns.append(np.array(own, dtype=np.int64))
     return _Layout(
         tuple(columns),
         tuple(np.array(p, dtype=np.int64) for p in pools.values() if len(p) > 1),
         np.array(low),
         np.array(high),
+        np.array(scale),
     )
 
 
@@ -260,7 +271,8 @@ class _Together:
             residuals.append(model.residuals(theta[columns]))
             cost += model.cost(weight * residuals[-1], theta[columns])
         for pool in self.layout.pools:
-            cost += 0.5 * float(np.sum((theta[pool] - np.mean(theta[pool])) ** 2)) / self.spread**2
+            away = (theta[pool] - np.mean(theta[pool])) / (self.spread * self.layout.scale[pool])
+            cost += 0.5 * float(np.sum(away**2))
         return residuals, cost
 
     def derivative(self, theta: Array, residuals: list[Array], stride: float) -> list[Array]:
@@ -281,7 +293,8 @@ class _Together:
             normal[np.ix_(columns, columns)] += weighted.T @ weighted + np.diag(own**2)
             gradient[columns] += weighted.T @ (weight * left) + own * model.prior(theta[columns])
         for pool in self.layout.pools:
-            together = (np.eye(len(pool)) - 1.0 / len(pool)) / self.spread**2
+            scatter = self.spread * self.layout.scale[pool[0]]
+            together = (np.eye(len(pool)) - 1.0 / len(pool)) / scatter**2
             normal[np.ix_(pool, pool)] += together
             gradient[pool] += together @ theta[pool]
         return normal, gradient

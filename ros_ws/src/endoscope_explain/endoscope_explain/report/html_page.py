@@ -13,6 +13,7 @@ from endoscope_explain.fit.evidence import slips
 from endoscope_explain.fit.free_parameters import tolerance
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.observe.predicted_signals import RecordedView, view
+from endoscope_explain.observe.revisits import motion_repeats
 from endoscope_explain.report import numbers, sentences
 from endoscope_explain.report.figures import experiment_figure, ladder_figure, unknown_figure
 from endoscope_explain.report.passage import (
@@ -22,7 +23,6 @@ from endoscope_explain.report.passage import (
     telling_signals,
     timeline_figure,
 )
-from endoscope_explain.search.repetition import motion_repeats
 from endoscope_pages import render_page
 
 COLOURS = {

@@ -2,13 +2,18 @@
 
 import math
 from collections.abc import Callable, Hashable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import chain
+
+import numpy as np
 
 from endoscope_core.physics.effect import Traits
 from endoscope_core.workers import parallel_map
+from endoscope_explain.fit.family import family_at
 from endoscope_explain.fit.model import Fit
 from endoscope_explain.observe.observation import JointObservation
-from endoscope_explain.search.left_out import repeat_one_motion
+from endoscope_explain.observe.revisits import motion_repeats
+from endoscope_explain.search.left_out import LEAST_RECORDINGS, repeat_one_motion
 from endoscope_explain.search.null_rigs import NEAR
 from endoscope_explain.search.refit import (
     Candidate,
@@ -21,7 +26,6 @@ from endoscope_explain.search.refit import (
     term_of,
     trial_fit,
 )
-from endoscope_explain.search.repetition import motion_repeats
 from endoscope_explain.search.screen import (
     Background,
     Directions,
@@ -66,7 +70,7 @@ def screen_terms(parent: Parent, jobs: int, left_out: tuple[str, ...]) -> Screen
     behind = tuple(background(found) for found in parent.candidate.fits)
     terms = _terms(behind, left_out)
     ways = tuple(directions(b, own, jobs) for b, own in zip(behind, terms, strict=True))
-    return Screened(parent, behind, ways)
+    return Screened(parent, behind, _of_one_size(ways))
 
 
 def _terms(behind: Sequence[Background], left_out: tuple[str, ...]) -> list[tuple[Term, ...]]:
@@ -91,7 +95,63 @@ def _terms(behind: Sequence[Background], left_out: tuple[str, ...]) -> list[tupl
         for each in behind
     ]
     everywhere = set.intersection(*({term.id for term in terms} for terms in found))
-    return [tuple(term for term in terms if term.id in everywhere) for terms in found]
+    shared = _shared_functions(behind, told_from_time)
+    return [(*(term for term in terms if term.id in everywhere), *shared) for terms in found]
+
+
+def _shared_functions(
+    behind: Sequence[Background], told_from_time: Callable[[Traits, JointObservation], bool]
+) -> list[Term]:
+    """Functions of states that all recordings visit, over the range that they visit together."""
+    # That two recordings share a function nothing confirms. Of a period or a lag each would have
+    # its own.
+    if len(behind) < LEAST_RECORDINGS:
+        return []
+    visited: list[dict[str, Term]] = []
+    for each in behind:
+        observation = each.fit.model.observation
+        of_one = functions(each.fit, each.left(each.fit.residuals * each.weight))
+        visited.append(
+            {
+                term.id: term
+                for term in of_one
+                if term.family is not None
+                and term.family.band is None
+                and not term.multiplies
+                and told_from_time(term.effect.traits, observation)
+            }
+        )
+    shared = []
+    for name in sorted(set.intersection(*map(set, visited))):
+        families = [own[name].family for own in visited]
+        low = min(each.low for each in families if each is not None)
+        high = max(each.high for each in families if each is not None)
+        first = visited[0][name]
+        assert first.family is not None
+        if (family := family_at(first.family.place, (low, high))) is not None:
+            shared.append(replace(first, family=family))
+    return shared
+
+
+def _of_one_size(ways: tuple[tuple[Directions, ...], ...]) -> tuple[tuple[Directions, ...], ...]:
+    """Directions in which a function is drawn as large in each recording."""
+    if len(ways) == 1:
+        return ways
+    sizes: dict[str, list[float]] = {}
+    for way in chain(*ways):
+        if way.term.family is not None:
+            sizes.setdefault(way.term.id, []).append(way.term.family.size)
+    common = {name: float(np.exp(np.mean(np.log(own)))) for name, own in sizes.items()}
+
+    def scaled(way: Directions) -> Directions:
+        family = way.term.family
+        if family is None:
+            return way
+        factor = common[way.term.id] / family.size
+        term = replace(way.term, family=family.scaled(factor))
+        return replace(way, term=term, columns=factor * way.columns)
+
+    return tuple(tuple(map(scaled, own)) for own in ways)
 
 
 def addable(behind: Background, left_out: tuple[str, ...]) -> tuple[Term, ...]:
@@ -106,7 +166,7 @@ def expanded(screen: Screened, jobs: int) -> list[Candidate]:
     chosen = _worth_a_fit(_trials(screen, jobs))
     grown = parallel_map(lambda seen: refit(seen, parent), chosen, jobs)
     grown.sort(key=lambda c: -c.evidence)
-    if grown and not grown[0].is_noise:
+    if grown and not grown[0].is_noise and len(parent.fits) == 1:
         grown = _with_finer_functions(grown, screen, jobs)
         grown = _with_their_formulas(grown, screen, jobs)
     return _settled(grown, jobs)
@@ -122,6 +182,9 @@ def _trials(screen: Screened, jobs: int) -> list[tuple[float, Trial]]:
     likely = [
         _likely(*each, jobs) for each in zip(screen.behind, screen.ways, references, strict=True)
     ]
+    if len(likely) > 1:
+        # What one recording makes likely is tried in all of them.
+        likely = [_with_those_of(likely, *own) for own in zip(likely, screen.ways, strict=True)]
     tasks = [(n, term) for n, terms in enumerate(likely) for term in terms]
 
     def fitted(task: tuple[int, Term]) -> TrialFit:
@@ -147,6 +210,15 @@ def _trials(screen: Screened, jobs: int) -> list[tuple[float, Trial]]:
         if any(seen is not None for seen in used):
             trials.append((sum(map(math.log, costs)), used))
     return trials
+
+
+def _with_those_of(
+    all_of_them: Sequence[list[Term]], own: list[Term], ways: tuple[Directions, ...]
+) -> list[Term]:
+    """Terms of one recording, and one start of each that is likely in another."""
+    missing = {term.variant for term in chain(*all_of_them)} - {term.variant for term in own}
+    starts = [way.term for way in ways if way.term.variant in missing]
+    return own + first_of_each(starts, lambda term: term.variant)
 
 
 def _likely(

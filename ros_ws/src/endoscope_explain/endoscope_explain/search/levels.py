@@ -11,8 +11,7 @@ misfit: they are searched as one, by the sum of the evidence, and fitted togethe
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
+from itertools import takewhile
 
 from endoscope_core.physics.effects import lacking
 from endoscope_core.workers import parallel_map
@@ -25,10 +24,15 @@ from endoscope_explain.search.expansion import (
     first_of_each,
     screen_terms,
 )
-from endoscope_explain.search.left_out import LEAST_RECORDINGS, chance
+from endoscope_explain.search.judging import (
+    FALSE_ALARMS,
+    BesideNullRigs,
+    InRecordingsLeftOut,
+    Judge,
+)
+from endoscope_explain.search.left_out import LEAST_RECORDINGS
 from endoscope_explain.search.null_rigs import (
     NO_DETECTABLE_GAIN,
-    Null,
     null_of_several,
     null_rigs,
 )
@@ -40,14 +44,13 @@ from endoscope_explain.search.refit import (
 )
 
 MOST_EFFECTS = 2
-FALSE_ALARMS = 0.025
-"""Chance that rigs in which nothing is missing show as much, above which no term is added: 2 % are
-wanted, and 39 rigs tell no less."""
 MOST_FITS, WORTH_A_FIT = 6, 1.0
 """Fits of what every rig has, without which all other numbers were bent, and the gain of evidence
 in nats that is worth another one."""
 PARENTS = 2
 """Candidates that are added to."""
+NOT_JUDGED = BesideNullRigs(NO_DETECTABLE_GAIN)
+"""Where no term moves anything."""
 
 
 @dataclass(frozen=True)
@@ -56,11 +59,9 @@ class Level:
 
     parent: Candidate  # the best of those that were added to
     found: tuple[Candidate, ...]  # best first
-    null: Null  # what is shown where nothing is missing
-    # Whether the best one predicts blocks that it has not seen better than its parent.
-    predicts: bool = True
-    # Whether candidates are judged by leaving each recording out: the best first by that.
-    by_left_out: bool = False
+    judge: Judge = NOT_JUDGED
+    # Candidates that explain what they were fitted to, and do not foretell what they were not.
+    not_foretelling: tuple[Candidate, ...] = ()
 
     def gain(self, one: Candidate) -> float:
         """Logarithm of the evidence of a candidate over its parent's."""
@@ -69,28 +70,26 @@ class Level:
     @property
     def best(self) -> Candidate:
         """The candidate to go on with."""
-        # Other numbers, then what every rig has, and then a formula stand where they lose no more
-        # than form is worth.
-        top, worth = self.found[0], self.form_is_worth()
-        if self.by_left_out:
-            return top
+        # Other numbers, then nominal physics, and then a formula stand where nothing tells the best
+        # one from them.
+        top = self.found[0]
 
         def first(candidates: Iterable[Candidate]) -> Candidate | None:
-            return next((c for c in candidates if top.evidence - c.evidence <= worth), None)
+            return next((c for c in candidates if self.judge.stands_for(c, top)), None)
 
-        stands = first(c for c in self.found if self.adds_nothing(c))
-        stands = stands or first(c for c in self.found if c.adds_nominal)
+        stands = first(c for c in self.found if self.adds_nothing(c) and self.gain(c) > 0.0)
+        stands = stands or first(c for c in self.found if c.terms and c.terms[-1].is_nominal)
         if stands is None and not self.adds_nothing(top) and top.terms[-1].is_function:
-            stands = first(c for c in self.at_the_place_of(top) if not c.terms[-1].is_function)
+            formulas = [c for c in self.at_the_place_of(top) if not c.terms[-1].is_function]
+            stands = next((c for c in formulas if self._stands_as_formula(c)), None)
         return stands or top
+
+    def _stands_as_formula(self, one: Candidate) -> bool:
+        return self.judge.formula_stands(one, self.found[0], self.parent)
 
     def adds_nothing(self, one: Candidate) -> bool:
         """Whether a candidate has other numbers than its parent, and no term more."""
         return len(one.terms) == len(self.parent.terms)
-
-    def form_is_worth(self) -> float:
-        """Evidence by which an error of form as large as what is left may mislead."""
-        return max(float(np.quantile(self.null.doubt, 1.0 - FALSE_ALARMS)), 0.0)
 
     def at_the_place_of(self, one: Candidate) -> tuple[Candidate, ...]:
         """Candidates whose last term is at the same place, beside the same other terms."""
@@ -105,21 +104,13 @@ class Level:
 
     @property
     def p_value(self) -> float:
-        """Chance that a rig in which nothing is missing shows as much as the best candidate."""
-        if self.by_left_out:
-            return chance(self.best.foretold - self.parent.foretold)
-        return self.null.p_value(self.gain(self.best)) if self.found else 1.0
+        """Chance that nothing is missing where the best candidate gains so much."""
+        return self.judge.p_value(self.best, self.parent) if self.found else 1.0
 
     @property
     def is_found(self) -> bool:
         """Whether something is missing, and found."""
-        if self.by_left_out:
-            return self.p_value <= FALSE_ALARMS
-        # Nominal physics needs no more than to be worth its numbers: that a rig has none is no
-        # hypothesis.
-        if self.found and self.best.adds_nominal:
-            return self.gain(self.best) > 0.0 and self.predicts
-        return self.p_value <= FALSE_ALARMS and self.predicts
+        return bool(self.found) and self.judge.confirms(self.best, self.parent)
 
     def variants(self) -> tuple[Candidate, ...]:
         """The best candidate's effects acting on something else: beside another they may win."""
@@ -129,12 +120,10 @@ class Level:
         )
 
     def rivals(self) -> tuple[Candidate, ...]:
-        """Candidates behind the best one by no more than form is worth."""
-        if self.by_left_out:
-            best, *behind = self.found
-            return tuple(c for c in behind if chance(best.foretold - c.foretold) > FALSE_ALARMS)
-        least = self.found[0].evidence - self.form_is_worth()
-        return tuple(c for c in self.found if c is not self.best and c.evidence >= least)
+        """Candidates that nothing tells from the first one."""
+        top = self.found[0]
+        others = (c for c in self.found if c is not self.best)
+        return tuple(c for c in others if c is top or self.judge.stands_for(c, top))
 
 
 @dataclass(frozen=True)
@@ -153,7 +142,10 @@ class JointSearch:
 
     def tried(self) -> list[Candidate]:
         """All candidates, the one without any term first."""
-        return [self.nominal, *(c for level in self.levels for c in level.found)]
+        return [
+            self.nominal,
+            *(c for level in self.levels for c in (*level.found, *level.not_foretelling)),
+        ]
 
 
 def search(
@@ -189,7 +181,9 @@ def search(
             best = _from_afar(best)
             found = tuple(best if c is level.best else c for c in level.found)
             levels[-1] = level = replace(level, found=found)
-        others = [] if level.adds_nothing(best) else [*level.variants(), *level.rivals()]
+        # What every rig of this kind has takes the place of all that imitates it.
+        stands = level.adds_nothing(best) or best.terms[-1].is_nominal
+        others = [] if stands else [*level.variants(), *level.rivals()]
         others = [c for c in others if not level.adds_nothing(c)][: PARENTS - 1]
         parents = [
             Parent(each, tuple((own,) for own in each.fits))
@@ -212,12 +206,8 @@ def _told(level: Level) -> str:
     gain = level.gain(level.best)
     if level.is_found:
         return f'{names}, better by {gain:.0f} nats'
-    if not level.predicts:
-        return f'not {names}: better by {gain:.0f} nats, but not on what it was not fitted to'
-    if level.by_left_out:
-        return f'not {names}: better by {gain:.0f} nats, but not in recordings that are left out'
-    share = f'{level.p_value:.1%} of rigs without it show as much'
-    return f'not {names}: better by {gain:.0f} nats, but {share}'
+    doubts = level.judge.doubts(level.best, level.parent)
+    return f'not {names}: better by {gain:.0f} nats, but {doubts}'
 
 
 def _from_afar(one: Candidate) -> Candidate:
@@ -244,38 +234,62 @@ def _level(
     found.sort(key=lambda c: -c.evidence)
     ranked = tuple(first_of_each(found, lambda c: frozenset(term.variant for term in c.terms)))
     if not ranked:
-        return Level(first, (), NO_DETECTABLE_GAIN)
+        return Level(first, ())
     if len(first.fits) >= LEAST_RECORDINGS:
-        return _by_left_out(first, ranked, jobs)
+        left_out_of = InRecordingsLeftOut()
+        settled = parallel_map(converged, ranked, jobs)
+        return Level(first, left_out_of.ranked(tuple(settled), first), left_out_of)
     if not ranked[0].is_noise:
         ranked = (by_fine_derivatives(ranked[0]), *ranked[1:])
-    level = _beside_nothing_missing(Level(first, ranked, NO_DETECTABLE_GAIN), screens[0], jobs)
-    return replace(level, predicts=level.best.unseen_misfit < first.unseen_misfit)
+    foretelling, others = _foretelling(first, ranked)
+    level = Level(first, foretelling, not_foretelling=others)
+    judge = _beside_nothing_missing(level, screens[0], jobs)
+    best = replace(level, judge=judge).best
+    return replace(level, judge=replace(judge, predicts=_foretells(best, first)))
 
 
-def _by_left_out(first: Candidate, ranked: Sequence[Candidate], jobs: int) -> Level:
-    """A level whose candidates are judged in recordings that were left out."""
-    settled = parallel_map(converged, ranked, jobs)
-    gains = [each.foretold - first.foretold for each in settled]
-    # What all recordings confirm is first, then what is worth more to all of them.
-    order = sorted(
-        range(len(settled)),
-        key=lambda k: (chance(gains[k]) > FALSE_ALARMS, -float(np.sum(gains[k]))),
-    )
-    found = tuple(settled[k] for k in order)
-    return Level(first, found, NO_DETECTABLE_GAIN, by_left_out=True)
+def _foretelling(
+    first: Candidate, ranked: tuple[Candidate, ...]
+) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...]]:
+    """Candidates, best first, that foretell what was held out, and those that do not."""
+    # What leaves noise alone is what is missing. What leaves more is one of many forms that bend
+    # towards it, and evidence is largest for those that bend most: a length that is free to change
+    # with time follows every branch of a loop, and says nothing of the next one.
+    if ranked[0].is_noise or len(first.fits) > 1:
+        return ranked, ()
+    worth = [c for c in ranked if c.evidence > first.evidence]
+    leading = list(takewhile(lambda c: not _foretells(c, first), worth))
+    if len(leading) == len(worth):
+        return ranked, ()
+    others = leading + [c for c in worth if _may_stand(c, first) and not _foretells(c, first)]
+    found = tuple(c for c in ranked if all(c is not each for each in others))
+    return found, tuple(c for c in ranked if any(c is each for each in others))
 
 
-def _beside_nothing_missing(level: Level, screen: Screened, jobs: int) -> Level:
-    """A level with what rigs show in which nothing is missing."""
+def _may_stand(one: Candidate, first: Candidate) -> bool:
+    """Whether a candidate may stand for a better one; see `Level.best`."""
+    return len(one.terms) == len(first.terms) or one.terms[-1].is_nominal
+
+
+def _foretells(one: Candidate, first: Candidate) -> bool:
+    return one.unseen_misfit < first.unseen_misfit
+
+
+def _beside_nothing_missing(level: Level, screen: Screened, jobs: int) -> BesideNullRigs:
+    """What rigs show in which nothing is missing."""
+    top = level.found[0]
     if len(screen.behind) > 1:
-        top = level.found[0]
-        null = null_of_several(screen.behind, screen.ways, top.fits, level.gain(top), jobs)
-        return replace(level, null=null)
-    rigs = null_rigs(screen.behind[0], screen.ways[0], level.found[0].fit, jobs)
+        gain = level.gain(top)
+        return BesideNullRigs(null_of_several(screen.behind, screen.ways, top.fits, gain, jobs))
+    rigs = null_rigs(screen.behind[0], screen.ways[0], top.fit, jobs)
     if rigs is None:
-        return level
-    level = replace(level, null=rigs.as_screened())
-    if level.best.adds_nominal:
-        return level
-    return replace(level, null=rigs.beside(level.gain(level.best), FALSE_ALARMS, jobs))
+        return NOT_JUDGED
+    judge = BesideNullRigs(rigs.as_screened())
+    best = replace(level, judge=judge).best
+    if best.adds_nominal:
+        return judge
+    if not level.adds_nothing(best) and best.terms[-1].is_nominal:
+        # It is one hypothesis that was there before the data, and not the best of many.
+        rigs = rigs.of(best.terms[-1].id)
+    null = rigs.beside(level.gain(best), FALSE_ALARMS, jobs)
+    return BesideNullRigs(replace(null, doubt=judge.null.doubt))

@@ -126,6 +126,15 @@ class NullRigs:
     ways: tuple[Directions, ...]
     screened: Shown
 
+    def of(self, term: str) -> 'NullRigs':
+        """The same rigs, screened for one term alone."""
+        rows = [k for k, way in enumerate(self.ways) if way.term.id == term]
+        seen = self.screened
+        seen = replace(
+            seen, observed=seen.observed[rows], drawn=seen.drawn[rows], doubt=seen.doubt[rows]
+        )
+        return replace(self, ways=tuple(self.ways[k] for k in rows), screened=seen)
+
     def as_screened(self) -> Null:
         """What they show by the screen alone."""
         return Null(np.max(self.screened.drawn, axis=0), np.max(self.screened.doubt, axis=0))

@@ -23,7 +23,8 @@ from endoscope_explain.fit.free_parameters import (
 )
 from endoscope_explain.fit.model import Fit, JointModel, simulate_joint
 from endoscope_explain.observe.observation import JointObservation
-from endoscope_explain.search.repetition import likely_periods, motion_repeats, period_bounds
+from endoscope_explain.observe.revisits import motion_repeats
+from endoscope_explain.search.periods import likely_periods, period_bounds
 
 Variant = tuple[str, tuple[float, ...]]
 """A term, and what it acts on or which of its forms it has, which no shape of a tube changes."""

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from endoscope_core.physics.description import EffectSpec
-from endoscope_explain.fit.evidence import folds
 from endoscope_explain.fit.nominal import with_references
 from endoscope_explain.observe.observation import observe
+from endoscope_explain.observe.revisits import folds
+from endoscope_explain.search.judging import FALSE_ALARMS, InRecordingsLeftOut
 from endoscope_explain.search.left_out import chance, repeat_one_motion
-from endoscope_explain.search.levels import FALSE_ALARMS, search
+from endoscope_explain.search.levels import search
 
 GAINS = np.array([90.0, 110.0, 100.0, 120.0])
 
@@ -62,7 +63,7 @@ def test_what_all_tubes_lack_is_named_and_what_one_of_them_has_is_not(tubes):
     tried = search(tubes, jobs=2, depth=1)
     assert tried.found.effects == ('section_friction',)
     first, *_ = tried.levels
-    assert first.by_left_out
+    assert isinstance(first.judge, InRecordingsLeftOut)
     assert first.p_value <= FALSE_ALARMS
     mu = [
         item.value(float(theta))

@@ -10,7 +10,6 @@ from endoscope_core.physics.layout import IN_OTHER_JOINT
 from endoscope_explain.fit.nominal import with_references
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.search.levels import JointSearch, Level, search
-from endoscope_explain.search.null_rigs import NO_DETECTABLE_GAIN
 from endoscope_explain.search.other_joint import stands_beside
 
 
@@ -40,5 +39,5 @@ def test_only_what_depends_on_the_other_joint_is_searched_again(searched):
 
 def test_a_level_at_which_nothing_could_be_tried_leaves_it_open(searched):
     _, tried, moved = searched
-    without = JointSearch(tried.nominal, (Level(tried.nominal, (), NO_DETECTABLE_GAIN),))
+    without = JointSearch(tried.nominal, (Level(tried.nominal, ()),))
     assert not stands_beside(without, moved, (), 2)

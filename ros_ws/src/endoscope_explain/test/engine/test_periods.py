@@ -10,7 +10,7 @@ from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.places import NODES
 from endoscope_explain.fit.family import family_at
 from endoscope_explain.observe.observation import observe
-from endoscope_explain.search.repetition import likely_periods, period_bounds, periodogram
+from endoscope_explain.search.periods import likely_periods, period_bounds, periodogram
 
 
 @pytest.fixture

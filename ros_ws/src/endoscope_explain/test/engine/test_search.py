@@ -17,6 +17,7 @@ from endoscope_explain.fit.family import family_at
 from endoscope_explain.fit.model import jacobian, packed_joint, simulate_joint
 from endoscope_explain.fit.nominal import nominal_references
 from endoscope_explain.observe.observation import observe
+from endoscope_explain.search.judging import BesideNullRigs
 from endoscope_explain.search.levels import Level, search
 from endoscope_explain.search.null_rigs import Null
 from endoscope_explain.search.refit import Candidate, candidate
@@ -156,7 +157,7 @@ def _level(evidences, null):
     found = [_candidate(value, terms[name]) for name, value in evidences.items()]
     found.sort(key=lambda c: -c.evidence)
     null = np.asarray(null, dtype=float)
-    return Level(_candidate(0.0), tuple(found), Null(null, null))
+    return Level(_candidate(0.0), tuple(found), BesideNullRigs(Null(null, null)))
 
 
 def test_a_formula_is_taken_where_it_loses_no_more_than_form_is_worth():
@@ -186,7 +187,7 @@ def test_other_numbers_stand_where_a_term_does_hardly_more():
     beside = Level(
         _candidate(400.0, gravity),
         (_candidate(500.0, gravity, delay), _candidate(470.0, gravity)),
-        near.null,
+        near.judge,
     )
     assert beside.best.terms == (gravity,)
 
@@ -205,7 +206,8 @@ def test_nothing_is_found_that_rigs_without_it_show_as_well():
     assert not _level({'gravity': 500.0}, null).is_found
     assert _level({'gravity': 1001.0}, null).is_found
     assert _level({'gravity': 1001.0}, null).p_value == pytest.approx(1.0 / 40.0)
-    assert not replace(_level({'gravity': 1001.0}, null), predicts=False).is_found
+    seen = _level({'gravity': 1001.0}, null)
+    assert not replace(seen, judge=replace(seen.judge, predicts=False)).is_found
 
 
 def test_a_function_of_two_states_is_exported_as_a_product(references):

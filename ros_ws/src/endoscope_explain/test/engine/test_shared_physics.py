@@ -12,7 +12,7 @@ from endoscope_explain.fit.nominal import with_references
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.search.null_rigs import null_of_several, shown
 from endoscope_explain.search.screen import background, directions
-from endoscope_explain.search.term import effects, with_effect
+from endoscope_explain.search.term import Term, effects, with_effect
 from endoscope_explain.shared_physics import shared_effects
 
 GAIN = 0.9
@@ -68,7 +68,7 @@ def test_another_form_gains_by_one_effect_for_all_recordings(references):
 
 def test_what_all_recordings_lack_is_found_and_nothing_else(chosen):
     for given in chosen:
-        assert set(given.effects) == {'load_cell_gain'}
+        assert [term.id for term in given.terms] == ['load_cell_gain']
 
 
 def test_a_device_is_the_same_in_all_recordings_and_a_tube_is_not(chosen):
@@ -97,7 +97,9 @@ def test_what_given_physics_leaves_is_searched_for(one_joint, recordings):
     observations = observe(recordings[0], plant)
     _, ((refitted, _),) = with_references(recordings[0], observations, plant, 0.15, 1)
     model = with_effect(refitted.model, CATALOGUE['cogging'], {})
-    given = without_recording(('cogging',), fit(model, model.begun_at(refitted.theta)))
+    given = without_recording(
+        (Term(CATALOGUE['cogging']),), fit(model, model.begun_at(refitted.theta))
+    )
     explanation = explain_recording(recordings[0], plant, band=0.15, given={'bend_x': given})
     assert 'load_cell_gain' in [e.id for e in explanation.effects]
     assert explanation.adequate

@@ -1,56 +1,13 @@
-"""What repeats itself: the motion of a joint, and what a fit leaves over time or another state."""
+"""Periods with which what a fit leaves repeats over time or another state."""
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len, rfft
 from scipy.signal import find_peaks
 
-from endoscope_core.physics.layout import IN_COMMAND
-from endoscope_core.physics.simulator import TICK
 from endoscope_explain.observe.observation import JointObservation
 
 Array = NDArray[np.float64]
-
-
-EVERY_S = 0.02
-"""Time between the moments compared."""
-APART_S = 1.0
-APART_SHARE = 0.05
-"""Of the recording: a slow ramp has left the neighbourhood of an angle by then."""
-NEAR_ANGLE = 0.02
-NEAR_SPEED = 0.10
-LEAST_SHARE = 0.10
-"""Share of the recording that must have been seen before; a sine of 9 s has 0.3."""
-
-
-def motion_repeats(observation: JointObservation) -> bool:
-    """Whether enough of a joint's commanded motion has been commanded before."""
-    # A smooth force that depends on time explains any single pass through the workspace, and
-    # nothing of the next one.
-    command = observation.inputs[0, :, IN_COMMAND]
-    return share_seen_before(command, observation.tick) >= LEAST_SHARE
-
-
-def share_seen_before(command: Array, tick: float = TICK) -> float:
-    """Share of the moments at which angle and speed of a command (N,) were near earlier ones."""
-    # Near is within `NEAR_ANGLE` of its range and `NEAR_SPEED` of its largest speed; before is at
-    # least `APART_S` and `APART_SHARE` of the recording earlier.
-    every = max(1, round(EVERY_S / tick))
-    angle = command[::every]
-    speed = np.gradient(angle) if len(angle) > 1 else np.zeros_like(angle)
-    near_angle = NEAR_ANGLE * np.ptp(angle)
-    near_speed = NEAR_SPEED * np.max(np.abs(speed), initial=0.0)
-    apart = max(round(APART_S / (every * tick)), round(APART_SHARE * len(angle)))
-    seen = [
-        bool(
-            np.any(
-                (np.abs(angle[: i - apart] - angle[i]) <= near_angle)
-                & (np.abs(speed[: i - apart] - speed[i]) <= near_speed)
-            )
-        )
-        for i in range(apart + 1, len(angle))
-    ]
-    return sum(seen) / max(len(angle), 1)
 
 
 # Periods are peaks of the residuals' periodogram (Lomb, Astrophys. Space Sci. 39, 1976; Scargle,

@@ -1,0 +1,166 @@
+"""What of a motion was made before: there alone a fit can be checked by what it has not seen.
+
+A hysteresis loop has branches: where the tip is depends on the command, on which way it moves, and
+on where it last turned. A moment whose branch was passed before is a state seen twice, so that one
+visit can be fitted and the other one judged. What was visited once only was fitted, and no
+held-out sample says whether it would come again.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.physics.layout import IN_COMMAND
+from endoscope_core.physics.simulator import TICK
+from endoscope_explain.observe.observation import JointObservation
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+EVERY_S = 0.02
+"""Time between the moments compared."""
+APART_S = 1.0
+APART_SHARE = 0.05
+"""Of the recording: a slow ramp has left the neighbourhood of an angle by then."""
+NEAR_ANGLE = 0.02
+NEAR_SPEED = 0.10
+NEAR_TURN = 0.10
+"""Shares of range, largest speed and range again, within which angle, speed and the last turn of a
+command are those of another moment."""
+LEAST_SHARE = 0.10
+"""Share of the recording that must have been seen before; a calibration of 9 s has 0.13."""
+
+BLOCK_S = 2.0
+EVERY = 4
+GAP_S = 0.2
+"""Left out on both sides of a held-out block, for the memory of wires and tracker."""
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """A motion between two turns."""
+
+    start: float  # rad
+    end: float  # rad
+    seen_before: float  # share of it
+
+
+def motion_repeats(observation: JointObservation) -> bool:
+    """Whether enough of a joint's commanded motion has been commanded before."""
+    # A smooth force that depends on time explains any single pass through the workspace, and
+    # nothing of the next one.
+    return float(np.mean(seen_before(_command(observation), observation.tick))) >= LEAST_SHARE
+
+
+def seen_before(command: Array, tick: float = TICK) -> Mask:
+    """Which moments, every `EVERY_S` of a command (N,), are on a branch that was passed before."""
+    # Before is at least `APART_S` and `APART_SHARE` of the recording earlier.
+    every = _ticks(tick)
+    angle = command[::every]
+    speed = np.gradient(angle) if len(angle) > 1 else np.zeros_like(angle)
+    span = float(np.ptp(angle))
+    turned = _last_turn(angle, NEAR_ANGLE * span)
+    near_speed = NEAR_SPEED * np.max(np.abs(speed), initial=0.0)
+    apart = max(round(APART_S / (every * tick)), round(APART_SHARE * len(angle)))
+    found = np.zeros(len(angle), dtype=bool)
+    for i in range(apart + 1, len(angle)):
+        earlier = slice(i - apart)
+        found[i] = np.any(
+            (np.abs(angle[earlier] - angle[i]) <= NEAR_ANGLE * span)
+            & (np.abs(speed[earlier] - speed[i]) <= near_speed)
+            & (np.abs(turned[earlier] - turned[i]) <= NEAR_TURN * span)
+        )
+    return found
+
+
+def strokes(observation: JointObservation) -> list[Stroke]:
+    """The motion of a joint from turn to turn, and which share of each was made before."""
+    command = _command(observation)
+    angle, seen = command[:: _ticks(observation.tick)], seen_before(command, observation.tick)
+    bounds = _turns(angle, NEAR_ANGLE * float(np.ptp(angle)))
+    return [
+        Stroke(float(angle[a]), float(angle[b]), float(np.mean(seen[a : b + 1])))
+        for a, b in pairwise(bounds)
+        if abs(angle[b] - angle[a]) > NEAR_ANGLE * float(np.ptp(angle))
+    ]
+
+
+def _turns(angle: Array, least: float) -> list[int]:
+    """First moment, those of turns by more than `least`, and the last one."""
+    bounds, extreme, way = [0], 0, 0.0
+    for i in range(1, len(angle)):
+        moved = angle[i] - angle[extreme]
+        if way * moved > 0.0 or (way == 0.0 and abs(moved) > least):
+            extreme, way = i, float(np.sign(moved))
+        elif way != 0.0 and abs(moved) > least:
+            bounds.append(extreme)
+            extreme, way = i, float(np.sign(moved))
+    return [*bounds, len(angle) - 1]
+
+
+def _last_turn(angle: Array, least: float) -> Array:
+    """Angle (N,) at which a command last turned, at first where it began."""
+    turned = np.empty_like(angle)
+    for turn in _turns(angle, least)[:-1]:
+        turned[turn:] = angle[turn]
+    return turned
+
+
+def held_out(observation: JointObservation) -> tuple[Mask, Mask]:
+    """Samples (size,) of a recording that may be fitted, and those that are held out to judge."""
+    # Held out is what the second half of a motion makes again: every state that is judged was
+    # fitted before, and what was fitted to a time alone has to foretell. Where hardly anything is
+    # made again, blocks are held out.
+    time, begun = observation.times, 0.5 * observation.duration
+    seen = seen_before(_command(observation), observation.tick)
+    apart = _ticks(observation.tick) * observation.tick
+    moments = apart * np.arange(len(seen))
+    seen &= moments >= begun
+    if np.mean(seen) < LEAST_SHARE:
+        judged = _in_last_block(time)
+        return (_far_from_last_block(time), judged) if judged.any() else _everything(time)
+    judged = seen[np.clip(np.rint(time / apart).astype(np.int64), 0, len(seen) - 1)]
+    near = np.interp(time, moments, _widened(seen, round(GAP_S / apart))) > 0.0
+    return ~near, judged
+
+
+def _widened(seen: Mask, reach: int) -> Array:
+    """How many held-out moments are within `reach` moments."""
+    return np.convolve(seen, np.ones(2 * reach + 1), mode='same').round()
+
+
+def _everything(time: Array) -> tuple[Mask, Mask]:
+    # There is no whole block to hold out.
+    every = np.ones(len(time), dtype=bool)
+    return every, every
+
+
+def _in_last_block(time: Array) -> Mask:
+    return np.asarray(np.mod(time, BLOCK_S * EVERY) >= BLOCK_S * (EVERY - 1))
+
+
+def _far_from_last_block(time: Array) -> Mask:
+    phase = np.mod(time, BLOCK_S * EVERY)
+    return np.asarray((phase >= GAP_S) & (phase < BLOCK_S * (EVERY - 1) - GAP_S))
+
+
+def folds(time: Array) -> list[tuple[Mask, Mask]]:
+    """Samples (N,) that are fitted and that are judged, each sample judged once."""
+    found = []
+    for shift in range(EVERY):
+        moved = time + BLOCK_S * (EVERY - 1 - shift)
+        judged = _in_last_block(moved)
+        if judged.any():
+            found.append((_far_from_last_block(moved), judged))
+    return found
+
+
+def _ticks(tick: float) -> int:
+    """Between the moments compared."""
+    return max(1, round(EVERY_S / tick))
+
+
+def _command(observation: JointObservation) -> Array:
+    return np.asarray(observation.inputs[0, :, IN_COMMAND])
