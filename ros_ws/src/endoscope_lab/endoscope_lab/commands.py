@@ -214,6 +214,10 @@ BENCHES: dict[str, Bench] = {
         (
             _option('folder', 'folder of the recordings', type=Path),
             _file('--out', 'page to write (real.html)', Path('real.html')),
+            _flag(
+                '--thorough',
+                'each tube alone as well, all with the name withheld, and each piece taken out',
+            ),
             _jobs(),
         ),
     ),

@@ -94,12 +94,10 @@ class Recording:
     driver: Array  # joint-equivalent motor angle in rad
     actual: Array  # bending angle in rad
     rested: bool = True  # whether it begins at rest and without memory, so that `h` begins at zero
-    scored: NDArray[np.bool_] | None = None  # samples that count; all if not given
 
     def centred(self, values: Array) -> Array:
-        """The samples that count of values (N, ...), less their mean."""
-        counted = values if self.scored is None else values[self.scored]
-        return counted - np.mean(counted, axis=0)
+        """Values (N, ...) less their mean."""
+        return values - np.mean(values, axis=0)
 
 
 @dataclass(frozen=True)
@@ -173,19 +171,11 @@ def fit_model(recordings: Sequence[Recording], seed: int = 0, model: str = 'bouc
         r.actual - forward(bare, r.driver, y0)
         for r, y0 in zip(recordings, first.tolist(), strict=True)
     ]
-    offset = _mean_offset(recordings, residuals)
+    offset = float(np.mean([np.mean(residual) for residual in residuals]))
     centred = [r.centred(residual) for r, residual in zip(recordings, residuals, strict=True)]
     spread = np.mean(np.concatenate(centred) ** 2)
     parameters = family.build(found.x[:size], factors, offset if family.has_offset else 0.0)
     return ModelFit(parameters, float(np.sqrt(spread)), int(found.nfev), model, offset)
-
-
-def _mean_offset(recordings: Sequence[Recording], residuals: Sequence[Array]) -> float:
-    means = [
-        np.mean(residual if r.scored is None else residual[r.scored])
-        for r, residual in zip(recordings, residuals, strict=True)
-    ]
-    return float(np.mean(means))
 
 
 def _linear_part(recordings: Sequence[Recording], memories: Sequence[Array]) -> tuple[Array, float]:

@@ -60,10 +60,7 @@ _DEVIATIONS = np.array([*FITTED.values(), *SHAPED.values(), BENDS[1]])
 _FTOL = 1e-3
 """Share of the cost by which a last step lowers it: a good fit of 9 s costs 144, and a number that
 is off by its standard deviation a half more."""
-_FEW_EVALUATIONS, _MOST_EVALUATIONS = 3, 12
-"""Of a fit that shows which rig is nearer, and of the one that goes on from there."""
-_CLEARLY = 2.0
-"""Times what the better rig leaves, beyond which the other is not gone on with."""
+_EVALUATIONS = 15
 
 
 class PlantFitError(EndoscopeError, ValueError):
@@ -113,15 +110,7 @@ def fit_plant(
         known = (shipped_family().joint, _whatever_the_bend(SLAVE))
         rigs = [_with_pulley(rig, _GEAR / gear) for rig in known]
     searches = [_Search.of(rig, gear * u, wires, angle) for rig in rigs]
-    begun = [search.from_best_start() for search in searches]
-    # A rig that explains the tensions much better by then is the one; of rigs that are alike each
-    # goes on to the end.
-    left = [search.tension_rmse(each.x) for search, each in zip(searches, begun, strict=True)]
-    ends = [
-        (search, search.fitted(each.x, _MOST_EVALUATIONS))
-        for search, each, rmse in zip(searches, begun, left, strict=True)
-        if rmse < _CLEARLY * min(left)
-    ]
+    ends = [(search, search.fitted()) for search in searches]
     search, found = min(ends, key=lambda pair: pair[0].tension_rmse(pair[1].x))
     wires_off, angle_off = search.misfits(found.x)
     columns = 1 + len(found.x)
@@ -129,8 +118,7 @@ def fit_plant(
         search.physical(found.x),
         _rms(wires_off),
         _rms(angle_off) if angle_off.size else None,
-        len(rigs) * len(_STARTS)
-        + columns * sum(each.nfev for each in (*begun, *(end for _, end in ends))),
+        len(rigs) * len(_STARTS) + columns * sum(end.nfev for _, end in ends),
     )
 
 
@@ -216,13 +204,10 @@ class _Search:
         x[0] = math.log(exponent / max(self.in_tube(BENDS[0]).capstan_exponent, 1e-3))
         return x
 
-    def from_best_start(self) -> OptimizeResult:
-        """A few steps from the start that explains most."""
+    def fitted(self) -> OptimizeResult:
+        """The fit from the start that explains most."""
         tried = [self.at_exponent(exponent) for exponent in _STARTS]
         begin = min(tried, key=lambda x: float(np.sum(self.residuals(x)[: -len(x)] ** 2)))
-        return self.fitted(begin, _FEW_EVALUATIONS)
-
-    def fitted(self, begin: Array, evaluations: int) -> OptimizeResult:
         expected = self.expected
         low, high = expected - 3.0 * _DEVIATIONS, expected + 3.0 * _DEVIATIONS
         low[0], high[0] = (self.at_exponent(exponent)[0] for exponent in EXPONENT_BOUNDS)
@@ -234,7 +219,7 @@ class _Search:
             diff_step=1e-3,
             xtol=1e-4,
             ftol=_FTOL,
-            max_nfev=evaluations,
+            max_nfev=_EVALUATIONS,
         )
 
 

@@ -13,7 +13,7 @@ from endoscope_core.physics import EffectSpec, PlantDescription
 from endoscope_core.signals import non_periodic_signal, periodic_signal
 from endoscope_lab.papers.real_recordings import (
     hysteresis_model,
-    models_on_real_recordings,
+    left_of_the_rest,
     real_recordings,
 )
 from endoscope_lab.papers.row import PapersBench, Row
@@ -217,12 +217,12 @@ def real_recordings_rows(settings: PapersBench) -> list[Row]:
         return []
     found = []
     for model in MODELS:
-        second = models_on_real_recordings(recordings, hysteresis_model(model, settings.seed))
-        for bend, (fitted, judged) in second.items():
+        rest = left_of_the_rest(recordings, hysteresis_model(model, settings.seed))
+        for bend, (fitted, judged) in rest.items():
             known = _STRAIGHT_DEG.get(model) if bend == 0 else None
             found.append(
                 Row(
-                    f'{model}, tube bent {bend} deg (first cycle {np.rad2deg(fitted):.2f})',
+                    f'{model}, tube bent {bend} deg (as fitted {np.rad2deg(fitted):.2f})',
                     [float(np.rad2deg(judged))],
                     '' if known is None else f'{known} at 0',
                     at_most=known,

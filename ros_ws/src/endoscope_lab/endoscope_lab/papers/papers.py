@@ -22,8 +22,8 @@ TABLES = {
     'at 10 s',
     'calibration_time': 'Calibration, from request to compensated motion, s',
     'real_sizes': 'Real recordings: backlash size from tension alone',
-    'real_recordings': 'Real recordings (five tubes): identified on the first cycle, judged on the '
-    'second, deg rms',
+    'real_recordings': 'Real recordings (five tubes): identified on 1.3 cycles, judged on the rest '
+    'of two, deg rms',
 }
 """Titles of the tables, in the order of printing; `papers` has a function `NAME_rows` for each."""
 OURS = {

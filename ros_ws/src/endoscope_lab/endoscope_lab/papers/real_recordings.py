@@ -20,6 +20,7 @@ from endoscope_lab.identification.family_fit import (
     ACTUAL,
     CYCLE_S,
     DESIRED,
+    FITTED_CYCLES,
     NEGATIVE,
     PHASE,
     POSITIVE,
@@ -94,37 +95,28 @@ def without_repeats(table: Array) -> Array:
     return np.asarray(table[np.diff(table[:, PHASE], prepend=-1.0) != 0.0])
 
 
-def closed_cycle(driver: Array, actual: Array) -> Recording:
-    """One whole period of angles (N,) in rad from rest, as it would go on for ever."""
-    # A model fitted to the first period alone may drift in the second, for nothing in the first
-    # says that loops close. Here the period is followed by itself, and the part before the first
-    # turning point, which belongs to the way from rest, counts only the first time.
-    turn = int(np.argmax(np.abs(driver[: len(driver) // 2])))
-    scored = np.ones(2 * len(driver), dtype=np.bool_)
-    scored[len(driver) : len(driver) + turn] = False
-    return Recording(np.tile(driver, 2), np.tile(actual, 2), scored=scored)
-
-
-def models_on_real_recordings(
+def left_of_the_rest(
     recordings: Sequence[RealRecording], predicted: Callable[[Recording, Array], Array]
 ) -> dict[int, tuple[float, float]]:
-    """RMSE in rad on the first cycle, which was fitted, and on the second, by the tube's bend.
+    """RMSE in rad on 1.3 cycles, which were fitted, and on the rest of two, by the tube's bend.
 
     `predicted` fits a model to a recording, and says its actual angle (N,) for a driving one, rad.
     """
+    # The first cycle begins at rest, and never shows the rise from the far end: loops are fitted
+    # from the first one that is whole.
     found = {}
     for recording in recordings:
-        first = recording.within(0.0, CYCLE_S)
-        second = recording.within(CYCLE_S, 2.0 * CYCLE_S)
-        cycle = closed_cycle(recording.desired[first], recording.actual[first])
-        error = predicted(cycle, recording.desired) - recording.actual
-        fitted, judged = (float(np.sqrt(np.mean(error[part] ** 2))) for part in (first, second))
+        first = recording.within(0.0, FITTED_CYCLES * CYCLE_S)
+        rest = recording.within(FITTED_CYCLES * CYCLE_S, 2.0 * CYCLE_S)
+        seen = Recording(recording.desired[first], recording.actual[first])
+        error = predicted(seen, recording.desired) - recording.actual
+        fitted, judged = (float(np.sqrt(np.mean(error[part] ** 2))) for part in (first, rest))
         found[recording.bend] = fitted, judged
     return found
 
 
 def hysteresis_model(model: str, seed: int) -> Callable[[Recording, Array], Array]:
-    """A model of the papers, for `models_on_real_recordings`."""
+    """A model of the papers, for `left_of_the_rest`."""
     return lambda recording, driver: fit_model([recording], seed, model).predict(driver)
 
 

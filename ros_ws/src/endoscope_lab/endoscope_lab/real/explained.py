@@ -51,14 +51,10 @@ def explained_tubes(folder: Path, jobs: int, tell: Tell) -> Tubes:
     """Fit all tubes together on their first 1.3 cycles, and search what they lack."""
     takes = [read(folder / f'{name}.txt') for name in TUBES]
     fitted_s = [FITTED_CYCLES * take.cycle_s for take in takes]
-    models = [
-        wide(take.until(end).observation()) for take, end in zip(takes, fitted_s, strict=True)
-    ]
-    starts = [as_described(model) for model in models]
-    fits = fit_together(models, starts)
-    for _ in range(ROUNDS - 1):
-        fits = fit_together(models, [f.theta for f in fits])
-    described = [_as_fit(m, s) for m, s in zip(models, starts, strict=True)]
+    parts = [take.until(end).observation() for take, end in zip(takes, fitted_s, strict=True)]
+    fits, described = fitted_as_one(parts)
+    models = [each.model for each in described]
+    starts = [each.theta for each in described]
     said: list[str] = []
 
     def heard(text: str) -> None:
@@ -92,7 +88,17 @@ def explained_tubes(folder: Path, jobs: int, tell: Tell) -> Tubes:
     )
 
 
-def _as_fit(model: JointModel, theta: Array) -> Fit:
+def fitted_as_one(observations: Sequence[JointObservation]) -> tuple[list[Fit], list[Fit]]:
+    """Recordings of all tubes fitted as one instrument, and as described."""
+    models = [wide(each) for each in observations]
+    starts = [as_described(model) for model in models]
+    fits = fit_together(models, starts)
+    for _ in range(ROUNDS - 1):
+        fits = fit_together(models, [f.theta for f in fits])
+    return fits, [as_fit(m, s) for m, s in zip(models, starts, strict=True)]
+
+
+def as_fit(model: JointModel, theta: Array) -> Fit:
     residuals = model.residuals(theta)
     return Fit(model, theta, residuals, jacobian(model, theta), model.cost(residuals, theta))
 

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from endoscope_core.identification import Recording
-from endoscope_lab.identification.family_fit import CYCLE_S
-from endoscope_lab.papers.real_recordings import RealRecording
 
 Array = NDArray[np.float64]
 
@@ -34,21 +30,8 @@ def fitted(recording: Recording, driver: Array) -> Array:
     weights = lsq_linear(
         recording.centred(known), recording.centred(recording.actual), (low, high)
     ).x
-    left = recording.actual - known @ weights
-    offset = np.mean(left if recording.scored is None else left[recording.scored])
+    offset = np.mean(recording.actual - known @ weights)
     found: Array = offset + _plays(thresholds, driver) @ weights
-    return found
-
-
-def left(recordings: Sequence[RealRecording], cycles: float) -> dict[str, float]:
-    """Rms in rad that the model leaves after the cycles it was fitted to, by the bend in deg."""
-    found = {}
-    for one in recordings:
-        begun = one.within(0.0, cycles * CYCLE_S)
-        after = one.within(cycles * CYCLE_S, 2.0 * CYCLE_S)
-        predicted = fitted(Recording(one.desired[begun], one.actual[begun]), one.desired)
-        error = (predicted - one.actual)[after]
-        found[str(one.bend)] = float(np.sqrt(np.mean(error**2)))
     return found
 
 

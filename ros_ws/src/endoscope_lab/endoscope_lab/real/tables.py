@@ -4,21 +4,18 @@ import argparse
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-import matplotlib
 import numpy as np
-from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
 from endoscope_core.atomic_output import write_text
 from endoscope_core.physics.effects import CATALOGUE, KNOWN
 from endoscope_explain.decide.conclusions import NOMINAL_UNITS
-from endoscope_explain.report.numbers import PLANTS as LABEL
 from endoscope_explain.report.numbers import digits, in_degrees
 from endoscope_explain.search.left_out import chance
 from endoscope_lab.bench import report, table_head, table_row
-from endoscope_lab.identification.family_fit import FITTED_CYCLES
-from endoscope_lab.papers.real_recordings import real_recordings
+from endoscope_lab.papers.real_recordings import left_of_the_rest, real_recordings
 from endoscope_lab.real import prandtl_ishlinskii
+from endoscope_lab.real.alone import Alone, Withheld, each_alone, name_withheld
 from endoscope_lab.real.explained import (
     Number,
     State,
@@ -28,9 +25,10 @@ from endoscope_lab.real.explained import (
     numbers,
     unknown_tubes,
 )
+from endoscope_lab.real.pictures import PLANTS, five_loops, function_over_angle, loops
+from endoscope_lab.real.pieces import Late, TakenOut, late_cells, taken_out
 from endoscope_lab.real.rig import Told
-from endoscope_lab.real.takes import between_cycles, require_recordings
-from endoscope_lab.still_pictures import INK, STYLE, svg, thinned
+from endoscope_lab.real.takes import TUBES, between_cycles, require_recordings
 from endoscope_pages import html_table, render_page
 
 PAGE = 'real.html'
@@ -44,7 +42,8 @@ def run(args: argparse.Namespace) -> int:
         tubes = explained_tubes(args.folder, args.jobs, report)
         state = explained_state(args.folder, tubes, args.jobs, report)
         unknown = unknown_tubes(args.folder, tubes, report)
-        box = prandtl_ishlinskii.left(real_recordings(args.folder), FITTED_CYCLES)
+        rest = left_of_the_rest(real_recordings(args.folder), prandtl_ishlinskii.fitted)
+        box = {str(bend): judged for bend, (_, judged) in rest.items()}
         parts = sections(
             tubes,
             numbers(tubes.explained, args.jobs),
@@ -53,21 +52,23 @@ def run(args: argparse.Namespace) -> int:
             numbers([state.fit], args.jobs),
             unknown,
         )
+        drawn: dict[str, str] = {}
+        if args.thorough:
+            parts += thorough_sections(
+                each_alone(args.folder, args.jobs, report),
+                withheld := name_withheld(args.folder, args.jobs, report),
+                late_cells(args.folder, args.jobs, report),
+                taken_out(args.folder, args.jobs, report),
+            )
+            drawn[WITHHELD] = function_over_angle(withheld)
     print(as_text(parts))
     picture = five_loops(tubes)
-    write_text(args.out, page(parts, picture, in_short(tubes, box)))
+    write_text(args.out, page(parts, picture, in_short(tubes, box), drawn))
     write_text(args.out.with_suffix('.svg'), picture)
     print(f'\nPage: {args.out}')
     return 0
 
 
-PLANTS = ('nominal', 'refitted', 'augmented')
-LINE = {
-    'measured': ('-', INK),
-    'nominal': ('-', '#c2571a'),
-    'refitted': ('--', '#2f6fb7'),
-    'augmented': ('-.', '#1a8a66'),
-}
 UNITS = {
     **NOMINAL_UNITS,
     **{f'{e.id}.{p.name}': p.unit for e in CATALOGUE.values() for p in e.parameters},
@@ -135,6 +136,12 @@ WORTH = (
     'Nats of the evidence of all tubes, and of each tube where it was left out: the others say '
     'what the instrument is, what scatters is refitted to three quarters of its blocks, the fourth '
     'is judged. What carries best is taken; chance of gains like these where it is worth nothing.'
+)
+
+WITHHELD = 'The name withheld'
+NUMBERS_OF_PIECES = (
+    'The number as found, and in the whole plant, where the piece is named; what is named instead '
+    'where not; nats that it costs.'
 )
 
 Section = tuple[str, str, tuple[str, ...], Rows, Sequence[Told]]
@@ -205,6 +212,80 @@ def sections(
     ]
 
 
+def thorough_sections(
+    alone: Sequence[Alone], withheld: Withheld, late: Sequence[Late], out: Sequence[TakenOut]
+) -> list[Section]:
+    """What is said of each tube alone, with the name withheld, of the cells, and of each piece."""
+    pieces = {one.piece: [o for o in out if o.piece == one.piece] for one in out}
+    first = sum(one.named[:1] == (one.piece,) for one in out)
+    return [
+        (
+            'Each tube alone',
+            'Whole loops. Dismissed has more evidence, and does not foretell what comes again.',
+            ('tube', 'named', 'nats', 'chance', 'dismissed'),
+            [
+                (
+                    a.tube,
+                    ', '.join(a.named) or 'nothing',
+                    f'{a.gain:+.0f}',
+                    f'{a.p_value:.3f}',
+                    ', '.join(a.dismissed) or '-',
+                )
+                for a in alone
+            ],
+            (),
+        ),
+        (
+            WITHHELD,
+            f'Whole loops of all tubes. Named: {", ".join(withheld.named) or "nothing"}.',
+            ('term', 'all', *TUBES, 'chance'),
+            [
+                (
+                    name,
+                    f'{gain:+.0f}',
+                    *(f'{v:+.0f}' for v in gained),
+                    f'{chance(np.array(gained)):.3f}',
+                )
+                for name, gain, gained in withheld.gains
+            ],
+            (),
+        ),
+        (
+            'Which cell is late, and how',
+            'Each tube fitted to its angle and one cell alone.',
+            ('tube', 'cell', 'by a delay, ms', 'by a lag, ms', 'nats for the delay'),
+            [
+                (
+                    each.tube,
+                    each.cell.lstrip('_'),
+                    f'{1e3 * each.delay_s:.0f}',
+                    f'{1e3 * each.lag_s:.0f}',
+                    f'{each.for_delay:+.0f}',
+                )
+                for each in late
+            ],
+            (),
+        ),
+        (
+            'Pieces taken out',
+            f'Whole loops. Named first: {first} of {len(out)}. {NUMBERS_OF_PIECES}',
+            ('piece', *TUBES),
+            [(piece, *map(_taken_out, ones)) for piece, ones in pieces.items()],
+            (),
+        ),
+    ]
+
+
+def _taken_out(one: TakenOut) -> str:
+    found, whole = one.number
+    if one.piece in one.named:
+        beside = f', after {one.named[0]}' if one.named[0] != one.piece else ''
+        said = f'{digits(found, 3)}, {digits(whole, 3)}{beside}'
+    else:
+        said = one.named[0] if one.named else 'nothing'
+    return f'{said} ({one.costs:.0f})'
+
+
 def as_text(parts: Iterable[Section]) -> str:
     """The tables as they are printed."""
     return '\n\n'.join(
@@ -232,77 +313,19 @@ def in_short(tubes: Tubes, box: Mapping[str, float]) -> dict[str, object]:
     }
 
 
-def five_loops(tubes: Tubes) -> str:
-    """The last loop of each tube as measured, without and with what was missing (SVG)."""
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(11.0, 2.9), layout='constrained')
-        axes = figure.subplots(1, len(tubes.told), sharey=True)
-        for axis, told in zip(axes, tubes.told, strict=True):
-            channel = told.plants['refitted'].model.observation.channels[-1]
-            seen = channel.time >= channel.time[-1] - told.take.cycle_s
-            command = np.rad2deg(np.interp(channel.time, told.take.time, told.take.command))
-            for label, values, colour, width in (
-                ('measured', channel.value, '#b8c1cc', 4.0),
-                ('simulated', told.plants['refitted'].predicted()[-1], LINE['nominal'][1], 1.2),
-                (
-                    'simulated, with what was missing',
-                    told.plants['augmented'].predicted()[-1],
-                    LINE['augmented'][1],
-                    1.2,
-                ),
-            ):
-                axis.plot(
-                    command[seen], np.rad2deg(values[seen]), color=colour, lw=width, label=label
-                )
-            axis.set_title(f'tube bent by {told.take.name} deg')
-            axis.set_xlabel('command (deg)')
-        axes[0].set_ylabel('angle of the tip (deg)')
-        handles = axes[0].get_legend_handles_labels()
-        figure.legend(*handles, loc='outside lower center', ncols=3)
-        return svg(figure)
-
-
-def page(parts: Sequence[Section], hero: str, story: Mapping[str, object]) -> str:
+def page(
+    parts: Sequence[Section], hero: str, story: Mapping[str, object], drawn: Mapping[str, str]
+) -> str:
     """A page that needs no other file."""
     shown = [
-        (title, words, html_table(header, rows, words=1), [loops(one, header[3]) for one in told])
+        (
+            title,
+            words,
+            html_table(header, rows, words=1),
+            [*(loops(one, header[3]) for one in told), *([drawn[title]] if title in drawn else [])],
+        )
         for title, words, header, rows, told in parts
     ]
     return render_page(
         'endoscope_lab', 'real/templates/real.html.j2', sections=shown, hero=hero, story=story
     )
-
-
-def loops(told: Told, last: str) -> str:
-    """Angle and tensions over the command, measured and as each plant predicts them (SVG)."""
-    take = told.take
-    channels = told.plants['nominal'].model.observation.channels
-    curves = {name: told.plants[name].predicted() for name in PLANTS}
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(11.0, 3.3), layout='constrained')
-        axes = figure.subplots(1, len(channels), squeeze=False)[0]
-        order = [len(channels) - 1, *range(len(channels) - 1)]
-        for axis, k in zip(axes, order, strict=True):
-            channel = channels[k]
-            seen = channel.time >= told.begin
-            factor = np.rad2deg(1.0) if channel.quantity == 'bending' else 1.0
-            command = np.rad2deg(np.interp(channel.time, take.time, take.command))
-            for name, values in (
-                ('measured', channel.value),
-                *((n, c[k]) for n, c in curves.items()),
-            ):
-                axis.plot(
-                    *thinned(command[seen], factor * values[seen]),
-                    LINE[name][0],
-                    color=LINE[name][1],
-                    lw=2.2 if name == 'measured' else 1.0,
-                    zorder=1 if name == 'measured' else 2,
-                    label=last if name == 'augmented' else LABEL.get(name, name),
-                )
-            unit = 'deg' if channel.quantity == 'bending' else 'N'
-            axis.set_title(f'{take.name}: {channel.signal.partition(":")[2]} ({unit})')
-            axis.set_xlabel('command (deg)')
-        figure.legend(
-            *axes[0].get_legend_handles_labels(), loc='outside upper right', ncols=4, fontsize=8
-        )
-        return svg(figure)
