@@ -160,7 +160,7 @@ class ExplainedCase:
     places: tuple[Place, ...]
     # The improved plant: the engine's augmented one with what the audit found in it.
     plant: PlantDescription
-    ladder: Ladder  # on held-out blocks of the recording
+    ladder: Ladder  # on what was held out of the recording
     # on the second recording; empty if none was given
     validation: Ladder = field(default_factory=dict)
     validation_name: str = ''  # empty if none was given

@@ -88,7 +88,7 @@ def explain_recording(
         return given is None and stands_beside(tried, angle, left_out, jobs)
 
     searches, decisions = _explained_together(references, explained, stands, jobs, tell)
-    tell('judging on held-out blocks')
+    tell('judging on what was held out')
     effects = named(observations, decisions)
     of_joint = {o.joint: d for o, d in zip(observations, decisions, strict=True)}
     return Explanation(

@@ -262,7 +262,7 @@ def ladder(
     searches: list[JointSearch],
     decisions: list[Decision],
 ) -> dict[str, dict[str, ChannelFit]]:
-    """Misfit of the plant as described, refitted and augmented, on held-out blocks."""
+    """Misfit of the plant as described, refitted and augmented, on what was held out."""
     compared: dict[str, dict[str, ChannelFit]] = {'nominal': {}, 'refitted': {}, 'augmented': {}}
     for (_, described), tried, decision in zip(references, searches, decisions, strict=True):
         observation = described.model.observation

@@ -113,7 +113,7 @@ REFIT_STEPS, REFIT_TOLERANCE = 4, 1e-2
 
 
 def held_out_residuals(final: Fit) -> Array:
-    """Residuals (size,) of a fit that has not seen the held-out blocks."""
+    """Residuals (size,) of a fit that has not seen what was held out."""
     fitted, judged = held_out(final.model.observation)
     if judged.all():
         return final.residuals
@@ -123,7 +123,7 @@ def held_out_residuals(final: Fit) -> Array:
 
 
 def held_out_misfit(observation: JointObservation, residuals: Array) -> float:
-    """Sum over the signals of the logarithm of their mean square on the held-out blocks."""
+    """Sum over the signals of the logarithm of their mean square on what was held out."""
     _, judged = held_out(observation)
     return sum(
         float(np.log(np.maximum(np.mean(residuals[part][judged[part]] ** 2), 1.0)))
@@ -133,7 +133,7 @@ def held_out_misfit(observation: JointObservation, residuals: Array) -> float:
 
 
 def held_out_fit(observation: JointObservation, residuals: Array) -> dict[str, ChannelFit]:
-    """What residuals (size,) leave of every signal on the held-out blocks."""
+    """What residuals (size,) leave of every signal on what was held out."""
     (_, judged), result = held_out(observation), {}
     for channel, part in zip(observation.channels, observation.slices(), strict=True):
         use = judged[part] if judged[part].any() else np.ones_like(judged[part])

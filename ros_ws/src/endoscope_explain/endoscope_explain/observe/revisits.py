@@ -35,7 +35,7 @@ LEAST_SHARE = 0.10
 BLOCK_S = 2.0
 EVERY = 4
 GAP_S = 0.2
-"""Left out on both sides of a held-out block, for the memory of wires and tracker."""
+"""Left out on both sides of what is held out, for the memory of wires and tracker."""
 
 
 @dataclass(frozen=True)

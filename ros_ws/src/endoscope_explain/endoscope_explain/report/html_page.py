@@ -195,7 +195,7 @@ def _cut(case: ExplainedCase, joint: str) -> str:
 
 
 def _tables(case: ExplainedCase, ladder: Ladder) -> list[dict[str, Any]]:
-    titled = {'held-out blocks of this recording': ladder}
+    titled = {'held-out parts of this recording': ladder}
     titled[f'second recording: {case.validation_name}'] = numbers.judged(case, case.validation)
     return [
         {

@@ -60,12 +60,12 @@ class Candidate:
 
     @cached_property
     def unseen(self) -> tuple[Array, ...]:
-        """Residuals (size,) of refits that have not seen the held-out blocks."""
+        """Residuals (size,) of refits that have not seen what was held out."""
         return tuple(held_out_residuals(each) for each in self.fits)
 
     @cached_property
     def unseen_misfit(self) -> float:
-        """What these refits leave on these blocks; see `held_out_misfit`."""
+        """What these refits leave of it; see `held_out_misfit`."""
         return sum(
             held_out_misfit(each.model.observation, left)
             for each, left in zip(self.fits, self.unseen, strict=True)
