@@ -1,4 +1,7 @@
-"""The page of the console in a real browser: each button, each kind of hand, what ends a grip."""
+"""The page of the console in a real browser: each button, each kind of hand, what ends a grip.
+
+Eight journeys for every change; the others are tried at night.
+"""
 
 import re
 
@@ -163,6 +166,7 @@ def test_keys_hold_and_a_release_ends_it(console, page):
     release()
 
 
+@pytest.mark.nightly
 def test_a_mouse_on_the_pad_holds_and_drags(console, page):
     enable(page)
     box = page.locator('#pad').bounding_box()
@@ -188,6 +192,7 @@ def test_a_mouse_on_the_pad_holds_and_drags(console, page):
     assert console.stands(page), 'a mouse that hovers moves nothing'
 
 
+@pytest.mark.nightly
 def test_fingers_hold_by_both_areas_together(console, browser):
     how = {'viewport': {'width': 1024, 'height': 768}, 'has_touch': True}
     with console.page(browser, **how) as page:
@@ -223,6 +228,7 @@ def test_fingers_hold_by_both_areas_together(console, browser):
         assert console.stands(page)
 
 
+@pytest.mark.nightly
 def test_a_gamepad_holds_and_lets_go_when_unplugged(console, browser):
     with console.page(browser, script=GAMEPAD) as page:
         take(page)
@@ -275,6 +281,7 @@ def test_what_takes_the_page_away_lets_go_at_once(console, page, script, reason)
     release()
 
 
+@pytest.mark.nightly
 def test_what_the_server_said_before_it_heard_hides_no_reason(console, browser):
     with console.page(browser, script=REPEATS) as page:
         enable(page)
@@ -317,6 +324,7 @@ def test_of_two_pages_the_one_that_takes_over_has_the_controls(console, browser,
         shows(other, 'operator', 'nobody')
 
 
+@pytest.mark.nightly
 def test_whoever_looks_on_can_do_nothing(console, browser, page):
     with console.page(browser, token=console.viewer) as viewer:
         shows(viewer, 'next', 'You are looking on. To operate, open the operator’s address.')
@@ -345,6 +353,7 @@ def test_pause_is_always_live_for_who_operates(console, page):
     shows(page, 'state', 'DISABLED')
 
 
+@pytest.mark.nightly
 def test_a_button_that_is_not_held_for_a_second_does_nothing(console, page):
     take(page)
     page.keyboard.down('KeyE')
@@ -391,6 +400,7 @@ def test_home_calibration_and_compensation(console, page):
     expect(page.locator('#alarms')).to_contain_text('nothing is compensated')
 
 
+@pytest.mark.nightly
 def test_scale_and_mode_change_only_while_nothing_is_held(console, page):
     enable(page)
 
@@ -451,6 +461,7 @@ def test_recordings_are_made_and_offered_for_explanation(console, page):
     shows(page, 'state', 'DISABLED')
 
 
+@pytest.mark.nightly
 def test_every_node_is_seen_with_its_health(console, page):
     page.click('#tab-see')
     for node in console.ask(
@@ -464,6 +475,7 @@ def test_every_node_is_seen_with_its_health(console, page):
     expect(page.locator('#clients')).to_contain_text('this page')
 
 
+@pytest.mark.nightly
 def test_pause_ends_what_is_held_to_resume(console, page):
     enable(page)
     page.keyboard.press('Escape')
@@ -477,6 +489,7 @@ def test_pause_ends_what_is_held_to_resume(console, page):
     page.keyboard.up('KeyE')
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize('covers', ['?', 'Meta'])
 def test_what_covers_the_view_or_the_keys_lets_go(console, page, covers):
     enable(page)
@@ -489,6 +502,7 @@ def test_what_covers_the_view_or_the_keys_lets_go(console, page, covers):
     release()
 
 
+@pytest.mark.nightly
 def test_a_view_that_is_turned_says_so_and_is_turned_back(console, page):
     box = page.locator('#space').bounding_box()
     page.mouse.move(box['x'] + box['width'] / 2, box['y'] + box['height'] / 2)
@@ -499,6 +513,7 @@ def test_a_view_that_is_turned_says_so_and_is_turned_back(console, page):
     expect(page.locator('#view-reset')).to_be_hidden()
 
 
+@pytest.mark.nightly
 def test_help_tells_the_keys(console, page):
     page.keyboard.press('?')
     expect(page.locator('#help')).to_be_visible()
@@ -526,6 +541,7 @@ def test_a_page_whose_server_ends_says_so_and_comes_back_without_the_controls(co
         page.complaints.clear()
 
 
+@pytest.mark.nightly
 def test_a_page_without_its_key_says_what_to_do(console, browser):
     with browser.new_context() as context:
         page = context.new_page()
@@ -539,6 +555,7 @@ def test_a_page_without_its_key_says_what_to_do(console, browser):
         assert page.url == f'{console.address}/', 'the key is not left in the address'
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ('width', 'height', 'touch'), [(1440, 900, False), (1024, 768, True), (768, 1024, True)]
 )
@@ -553,6 +570,7 @@ def test_all_of_it_fits_on_the_screen(console, browser, width, height, touch):
         assert sizes['state'] == max(sizes.values()), 'the state is the largest word'
 
 
+@pytest.mark.nightly
 def test_nothing_is_cut_or_out_of_reach_in_a_small_window(console, browser):
     with console.page(browser) as page:
         for width, height in ((1440, 900), (1280, 600), (1100, 560), (800, 600), (390, 844)):
@@ -563,6 +581,7 @@ def test_nothing_is_cut_or_out_of_reach_in_a_small_window(console, browser):
         expect(page.locator('#plots')).to_be_visible()
 
 
+@pytest.mark.nightly
 def test_nothing_flashes_for_who_asked_for_less_motion(console, browser):
     with console.page(browser, reduced_motion='reduce') as page:
         assert page.evaluate(ANIMATION) == 'none'

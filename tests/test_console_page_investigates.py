@@ -120,6 +120,7 @@ def test_a_plant_is_adopted_and_undone(page):
     shows(page, 'adopt-answer', 'undone: no plant has been adopted')
 
 
+@pytest.mark.nightly
 def test_all_of_it_can_be_reached(running, browser):
     for width, height in ((1440, 900), (1024, 768)):
         with running.page(browser, viewport={'width': width, 'height': height}) as page:
