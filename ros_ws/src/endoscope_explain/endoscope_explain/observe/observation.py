@@ -198,11 +198,18 @@ class JointObservation:
         return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
 
+def commanded(recording: Recording) -> Array:
+    """Shaft commands (N, J) in rad on ticks, from the first one to the recording's end."""
+    asked = recording.command
+    begin = float(asked.time[0])
+    ticks = int(np.ceil((recording.duration - begin) / TICK)) + 2
+    return hold_on_ticks(asked.time - begin, asked.values, ticks)
+
+
 def observe(recording: Recording, plant: PlantDescription) -> tuple[JointObservation, ...]:
     """The analysis view of an audited recording, joint by joint, of those that the plant has."""
-    begin = float(recording.command.time[0])
-    ticks = int(np.ceil((recording.duration - begin) / TICK)) + 2
-    held = hold_on_ticks(recording.command.time - begin, recording.command.values, ticks)
+    begin, held = float(recording.command.time[0]), commanded(recording)
+    ticks = len(held)
     joints = []
     for j, joint in enumerate(recording.joints):
         if joint not in plant.joints:

@@ -45,6 +45,12 @@ class Stroke:
     start: float  # rad
     end: float  # rad
     seen_before: float  # share of it
+    revisited: float  # share that was passed before, or is passed again
+
+    @property
+    def twice(self) -> bool:
+        """Whether most of it was made at another time as well."""
+        return self.revisited > 0.5
 
 
 def motion_repeats(observation: JointObservation) -> bool:
@@ -56,6 +62,11 @@ def motion_repeats(observation: JointObservation) -> bool:
 
 def seen_before(command: Array, tick: float = TICK) -> Mask:
     """Which moments, every `EVERY_S` of a command (N,), are on a branch that was passed before."""
+    return _passed(command, tick)[0]
+
+
+def _passed(command: Array, tick: float) -> tuple[Mask, Mask]:
+    """Which moments are on a branch that was passed before, and on one that is passed again."""
     # Before is at least `APART_S` and `APART_SHARE` of the recording earlier.
     every = _ticks(tick)
     angle = command[::every]
@@ -64,26 +75,37 @@ def seen_before(command: Array, tick: float = TICK) -> Mask:
     turned = _last_turn(angle, NEAR_ANGLE * span)
     near_speed = NEAR_SPEED * np.max(np.abs(speed), initial=0.0)
     apart = max(round(APART_S / (every * tick)), round(APART_SHARE * len(angle)))
-    found = np.zeros(len(angle), dtype=bool)
+    before, again = np.zeros(len(angle), dtype=bool), np.zeros(len(angle), dtype=bool)
     for i in range(apart + 1, len(angle)):
         earlier = slice(i - apart)
-        found[i] = np.any(
+        same = (
             (np.abs(angle[earlier] - angle[i]) <= NEAR_ANGLE * span)
             & (np.abs(speed[earlier] - speed[i]) <= near_speed)
             & (np.abs(turned[earlier] - turned[i]) <= NEAR_TURN * span)
         )
-    return found
+        before[i] = np.any(same)
+        again[earlier] |= same
+    return before, again
 
 
 def strokes(observation: JointObservation) -> list[Stroke]:
     """The motion of a joint from turn to turn, and which share of each was made before."""
-    command = _command(observation)
-    angle, seen = command[:: _ticks(observation.tick)], seen_before(command, observation.tick)
-    bounds = _turns(angle, NEAR_ANGLE * float(np.ptp(angle)))
+    return strokes_of(_command(observation), observation.tick)
+
+
+def strokes_of(command: Array, tick: float = TICK) -> list[Stroke]:
+    """Those of a command (N,) in rad on ticks; see `strokes`."""
+    angle, (before, again) = command[:: _ticks(tick)], _passed(command, tick)
+    least = NEAR_ANGLE * float(np.ptp(angle))
     return [
-        Stroke(float(angle[a]), float(angle[b]), float(np.mean(seen[a : b + 1])))
-        for a, b in pairwise(bounds)
-        if abs(angle[b] - angle[a]) > NEAR_ANGLE * float(np.ptp(angle))
+        Stroke(
+            float(angle[a]),
+            float(angle[b]),
+            float(np.mean(before[a : b + 1])),
+            float(np.mean((before | again)[a : b + 1])),
+        )
+        for a, b in pairwise(_turns(angle, least))
+        if abs(angle[b] - angle[a]) > least
     ]
 
 

@@ -23,6 +23,7 @@ from endoscope_explain.report.passage import (
     telling_signals,
     timeline_figure,
 )
+from endoscope_explain.report.visited_once import visited_once
 from endoscope_pages import render_page
 
 COLOURS = {
@@ -88,6 +89,7 @@ def html_page(case: ExplainedCase) -> str:
         formula=unknown is not None and unknown.formula_share >= sentences.LEAST_SHARE,
         drawings=_drawings(case, recorded, joint, ladder),
         tables=_tables(case, ladder),
+        once=visited_once(case),
         parameters=_parameters(case),
         fitting=sentences.fitting_sentences(case),
         tried=_tried(case),

@@ -16,6 +16,7 @@ from endoscope_explain.report.numbers import (
     numbers_of,
     shown,
 )
+from endoscope_explain.report.visited_once import visited_once
 
 HEADLINES = {
     Verdict.CONSISTENT: 'Simulation and recording agree',
@@ -330,6 +331,7 @@ def told(case: ExplainedCase) -> str:
     if fits:
         head, rows = fits
         lines += table(('rmse / noise', *head[1:]), rows).splitlines()
+    lines += visited_once(case)
     lines.append(f'Next: {next_step(case)}')
     return '\n'.join(lines)
 

@@ -82,3 +82,5 @@ def test_strokes_say_which_of_them_were_made_before(one_joint):
     made = strokes(seen)
     assert [round(each.end, 1) for each in made] == [0.5, -0.5, 0.5, -0.5, 0.0]
     assert [each.seen_before > 0.5 for each in made] == [False, False, False, True, True]
+    # The first one begins where no other does; both falls are the same.
+    assert [made[k].twice for k in (0, 1, 3)] == [False, True, True]
