@@ -7,6 +7,7 @@ held-out sample says whether it would come again.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -67,14 +68,21 @@ def seen_before(command: Array, tick: float = TICK) -> Mask:
 
 def _passed(command: Array, tick: float) -> tuple[Mask, Mask]:
     """Which moments are on a branch that was passed before, and on one that is passed again."""
-    # Before is at least `APART_S` and `APART_SHARE` of the recording earlier.
     every = _ticks(tick)
-    angle = command[::every]
+    return _passed_by(command[::every].tobytes(), every * tick)
+
+
+# Every candidate of a search is judged on the same motion.
+@lru_cache(maxsize=16)
+def _passed_by(moments: bytes, apart_s: float) -> tuple[Mask, Mask]:
+    """Those of angles at moments `apart_s` from each other."""
+    # Before is at least `APART_S` and `APART_SHARE` of the recording earlier.
+    angle = np.frombuffer(moments)
     speed = np.gradient(angle) if len(angle) > 1 else np.zeros_like(angle)
     span = float(np.ptp(angle))
     turned = _last_turn(angle, NEAR_ANGLE * span)
     near_speed = NEAR_SPEED * np.max(np.abs(speed), initial=0.0)
-    apart = max(round(APART_S / (every * tick)), round(APART_SHARE * len(angle)))
+    apart = max(round(APART_S / apart_s), round(APART_SHARE * len(angle)))
     before, again = np.zeros(len(angle), dtype=bool), np.zeros(len(angle), dtype=bool)
     for i in range(apart + 1, len(angle)):
         earlier = slice(i - apart)
@@ -85,16 +93,12 @@ def _passed(command: Array, tick: float) -> tuple[Mask, Mask]:
         )
         before[i] = np.any(same)
         again[earlier] |= same
+    before.flags.writeable = again.flags.writeable = False
     return before, again
 
 
-def strokes(observation: JointObservation) -> list[Stroke]:
-    """The motion of a joint from turn to turn, and which share of each was made before."""
-    return strokes_of(_command(observation), observation.tick)
-
-
-def strokes_of(command: Array, tick: float = TICK) -> list[Stroke]:
-    """Those of a command (N,) in rad on ticks; see `strokes`."""
+def strokes(command: Array, tick: float = TICK) -> list[Stroke]:
+    """What a command (N,) in rad makes from turn to turn, and which share of it comes again."""
     angle, (before, again) = command[:: _ticks(tick)], _passed(command, tick)
     least = NEAR_ANGLE * float(np.ptp(angle))
     return [
@@ -139,7 +143,7 @@ def held_out(observation: JointObservation) -> tuple[Mask, Mask]:
     seen = seen_before(_command(observation), observation.tick)
     apart = _ticks(observation.tick) * observation.tick
     moments = apart * np.arange(len(seen))
-    seen &= moments >= begun
+    seen = seen & (moments >= begun)
     if np.mean(seen) < LEAST_SHARE:
         judged = _in_last_block(time)
         return (_far_from_last_block(time), judged) if judged.any() else _everything(time)

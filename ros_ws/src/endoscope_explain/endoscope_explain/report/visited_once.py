@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.observe.observation import commanded
-from endoscope_explain.observe.revisits import Stroke, strokes_of
+from endoscope_explain.observe.revisits import Stroke, strokes
 from endoscope_explain.report.numbers import moving_joints
 
 WIDE = 0.65
@@ -29,7 +29,7 @@ def visited_once(case: ExplainedCase) -> list[str]:
     desired = commanded(recording) / recording.gear
     moving = moving_joints(recording)
     said = [
-        once_only(joint, strokes_of(desired[:, j]))
+        once_only(joint, strokes(desired[:, j]))
         for j, joint in enumerate(recording.joints)
         if joint in moving
     ]

@@ -80,12 +80,10 @@ class Level:
         stands = first(c for c in self.found if self.adds_nothing(c) and self.gain(c) > 0.0)
         stands = stands or first(c for c in self.found if c.terms and c.terms[-1].is_nominal)
         if stands is None and not self.adds_nothing(top) and top.terms[-1].is_function:
-            formulas = [c for c in self.at_the_place_of(top) if not c.terms[-1].is_function]
-            stands = next((c for c in formulas if self._stands_as_formula(c)), None)
+            formulas = (c for c in self.at_the_place_of(top) if not c.terms[-1].is_function)
+            stand = (c for c in formulas if self.judge.formula_stands(c, top, self.parent))
+            stands = next(stand, None)
         return stands or top
-
-    def _stands_as_formula(self, one: Candidate) -> bool:
-        return self.judge.formula_stands(one, self.found[0], self.parent)
 
     def adds_nothing(self, one: Candidate) -> bool:
         """Whether a candidate has other numbers than its parent, and no term more."""
@@ -261,9 +259,10 @@ def _foretelling(
     leading = list(takewhile(lambda c: not _foretells(c, first), worth))
     if len(leading) == len(worth):
         return ranked, ()
-    others = leading + [c for c in worth if _may_stand(c, first) and not _foretells(c, first)]
-    found = tuple(c for c in ranked if all(c is not each for each in others))
-    return found, tuple(c for c in ranked if any(c is each for each in others))
+    stand_ins = [c for c in worth if _may_stand(c, first) and not _foretells(c, first)]
+    aside = {id(c) for c in (*leading, *stand_ins)}
+    found = tuple(c for c in ranked if id(c) not in aside)
+    return found, tuple(c for c in ranked if id(c) in aside)
 
 
 def _may_stand(one: Candidate, first: Candidate) -> bool:

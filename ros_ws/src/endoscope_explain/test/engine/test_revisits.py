@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.layout import IN_COMMAND
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.observe.revisits import (
     GAP_S,
@@ -79,7 +80,7 @@ def test_of_a_motion_that_is_never_made_again_blocks_are_judged(one_joint):
 
 def test_strokes_say_which_of_them_were_made_before(one_joint):
     seen = observation(one_joint, np.sin(TIME[:12566]))
-    made = strokes(seen)
+    made = strokes(seen.inputs[0, :, IN_COMMAND], seen.tick)
     assert [round(each.end, 1) for each in made] == [0.5, -0.5, 0.5, -0.5, 0.0]
     assert [each.seen_before > 0.5 for each in made] == [False, False, False, True, True]
     # The first one begins where no other does; both falls are the same.

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.workers import parallel_map
 from endoscope_explain.decide.decision import decide
-from endoscope_explain.search.levels import search
+from endoscope_explain.search.levels import Level, search
 from endoscope_lab.real.explained import as_fit, fitted_as_one
 from endoscope_lab.real.pieces import SECTION
 from endoscope_lab.real.rig import Plant, as_described, wide
@@ -36,7 +36,7 @@ class Withheld:
     """What all tubes lack where friction of the bending section may not be named."""
 
     named: tuple[str, ...]
-    gains: tuple[tuple[str, float, tuple[float, ...]], ...]  # of all tubes, and each left out
+    levels: tuple[Level, ...]  # what was tried
     # Of the first function, by tube: the state at its nodes and the values there (NODES,).
     curves: tuple[tuple[Array, Array], ...] = field(repr=False)
 
@@ -63,19 +63,10 @@ def name_withheld(folder: Path, jobs: int, tell: Tell) -> Withheld:
     fits, described = fitted_as_one([read(folder / f'{t}.txt').observation() for t in TUBES])
     references = list(zip(fits, described, strict=True))
     tried = search(references, jobs, 1, (SECTION,), tell)
-    level = tried.levels[0]
-    gains = tuple(
-        (
-            ', '.join(t.id for t in c.terms) or 'other numbers',
-            level.gain(c),
-            tuple((c.foretold - level.parent.foretold).tolist()),
-        )
-        for c in level.found
-    )
     curves = []
-    for found in level.best.fits:
+    for found in tried.levels[0].best.fits:
         for family, own in zip(
             found.model.families, found.model.coefficients(found.theta), strict=True
         ):
             curves.append((family.nodes, family.values(own)))
-    return Withheld(tuple(t.id for t in tried.found.terms), gains, tuple(curves))
+    return Withheld(tuple(t.id for t in tried.found.terms), tried.levels, tuple(curves))

@@ -9,6 +9,7 @@ from endoscope_core.workers import parallel_map
 from endoscope_explain.decide.decision import decide
 from endoscope_explain.fit.evidence import log_evidence
 from endoscope_explain.fit.model import Fit, without_effect
+from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.search.levels import search
 from endoscope_explain.search.term import with_effect
 from endoscope_lab.real.rig import AGE, Plant, as_described, wide
@@ -50,17 +51,17 @@ class Late:
     for_delay: float  # nats by which a delay explains more than a lag
 
 
-def whole_plant(folder: Path, tube: str) -> Fit:
-    """A tube's whole loops, fitted by the plant with friction in its bending section."""
-    model = wide(read(folder / f'{tube}.txt').observation())
-    model = with_effect(model, KNOWN[SECTION], {})
+def whole_plant(observation: JointObservation) -> Fit:
+    """Whole loops of a tube, fitted by the plant with friction in its bending section."""
+    model = with_effect(wide(observation), KNOWN[SECTION], {})
     return Plant(model, as_described(model)).refitted()
 
 
 def taken_out(folder: Path, jobs: int, tell: Callable[[str], None]) -> list[TakenOut]:
     """Take each piece out of each tube's plant, and explain the tube with what is left."""
     tell('fitting whole loops of each tube')
-    fits = parallel_map(lambda tube: whole_plant(folder, tube), TUBES, jobs)
+    seen = [read(folder / f'{tube}.txt').observation() for tube in TUBES]
+    fits = parallel_map(whole_plant, seen, jobs)
     tasks = [
         (piece, tube, found) for piece in PIECES for tube, found in zip(TUBES, fits, strict=True)
     ]
@@ -99,9 +100,7 @@ def late_cells(
         kept = tuple(
             c for c in observation.channels if c.quantity != 'tension' or c.signal.endswith(cell)
         )
-        model = wide(replace(observation, channels=kept))
-        model = with_effect(model, KNOWN[SECTION], {})
-        delayed = Plant(model, as_described(model)).refitted()
+        delayed = whole_plant(replace(observation, channels=kept))
         without, begun = without_effect(delayed, AGE)
         lagging = with_effect(without, KNOWN[OTHER_WAY], {})
         lagged = Plant(lagging, lagging.begun_at(begun)).refitted()

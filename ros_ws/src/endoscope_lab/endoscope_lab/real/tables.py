@@ -12,6 +12,7 @@ from endoscope_core.physics.effects import CATALOGUE, KNOWN
 from endoscope_explain.decide.conclusions import NOMINAL_UNITS
 from endoscope_explain.report.numbers import digits, in_degrees
 from endoscope_explain.search.left_out import chance
+from endoscope_explain.search.levels import Level
 from endoscope_lab.bench import report, table_head, table_row
 from endoscope_lab.papers.real_recordings import left_of_the_rest, real_recordings
 from endoscope_lab.real import prandtl_ishlinskii
@@ -61,6 +62,8 @@ def run(args: argparse.Namespace) -> int:
                 taken_out(args.folder, args.jobs, report),
             )
             drawn[WITHHELD] = function_over_angle(withheld)
+            beside = args.out.with_name(f'{args.out.stem}_function.svg')
+            write_text(beside, drawn[WITHHELD])
     print(as_text(parts))
     picture = five_loops(tubes)
     write_text(args.out, page(parts, picture, in_short(tubes, box), drawn))
@@ -114,10 +117,10 @@ def number_rows(numbers: Mapping[str, Sequence[Number | None]]) -> Rows:
     return rows
 
 
-def worth_rows(tubes: Tubes) -> Rows:
+def worth_rows(levels: Sequence[Level]) -> Rows:
     """What one term more is worth to all tubes, and to each by what the others say of it."""
     rows = []
-    for number, level in enumerate(tubes.levels, 1):
+    for number, level in enumerate(levels, 1):
         for one in level.found:
             gained = one.foretold - level.parent.foretold
             added = ', '.join(t.id for t in one.terms) or 'other numbers'
@@ -177,7 +180,7 @@ def sections(
             'What one effect more is worth',
             WORTH,
             ('step', 'effects', 'all', *names, 'chance'),
-            worth_rows(tubes),
+            worth_rows(tubes.levels),
             (),
         ),
         ('Tubes, 1.3 cycles', 'They were fitted.', plain, rmse_rows(first), ()),
@@ -238,16 +241,8 @@ def thorough_sections(
         (
             WITHHELD,
             f'Whole loops of all tubes. Named: {", ".join(withheld.named) or "nothing"}.',
-            ('term', 'all', *TUBES, 'chance'),
-            [
-                (
-                    name,
-                    f'{gain:+.0f}',
-                    *(f'{v:+.0f}' for v in gained),
-                    f'{chance(np.array(gained)):.3f}',
-                )
-                for name, gain, gained in withheld.gains
-            ],
+            ('step', 'effects', 'all', *TUBES, 'chance'),
+            worth_rows(withheld.levels),
             (),
         ),
         (
