@@ -90,6 +90,21 @@ def test_commissioning_moves_one_joint_alone_first():
     assert np.ptp(angle[:, 1]) == 0.0
 
 
+@pytest.mark.parametrize('joint', [0, 1])
+def test_commissioning_has_wide_strokes_twice_a_hold_and_a_small_loop(joint):
+    motion = motion_by_name('commissioning')
+    time = np.arange(0.0, motion.duration, 0.01)
+    angle = np.rad2deg(motion.sample(time)[0][:, joint])
+    held = np.flatnonzero(np.diff(angle) != 0.0)
+    assert 0.01 * np.diff(held[held > 0.5 * len(angle)]).max() == pytest.approx(5.0, abs=0.05)
+    angle = angle[np.r_[True, np.diff(angle) != 0.0]]
+    turned = angle[1:-1][np.diff(np.sign(np.diff(angle))) != 0.0]
+    strokes = np.diff(turned)
+    assert np.sum(strokes > 135.0) >= 2
+    assert np.sum(strokes < -135.0) >= 2
+    assert np.any((strokes > 9.0) & (strokes < 15.0) & (np.abs(turned[1:]) < 15.0))
+
+
 def test_a_jump_between_pieces_is_refused():
     with pytest.raises(ValueError, match='jumpy: hold begins'):
         sequence('jumpy', [move(0.0, 1.0, 1.0), hold(1.0)])

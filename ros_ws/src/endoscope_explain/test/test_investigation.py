@@ -12,6 +12,7 @@ from endoscope_core.errors import EndoscopeError, InputError, NotPlayedError, Ri
 from endoscope_core.investigation_folder import LOG, PAGE, held, is_left_behind
 from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
 from endoscope_core.physics.plant_file import load_plant, save_plant
+from endoscope_core.physics.simulator import TICK
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import hold, move, sequence
 from endoscope_core.signals.command_file import JOINTS, CommandTable, read_command_file
@@ -36,7 +37,9 @@ from endoscope_explain.investigation.motions import (
     commissioning,
     require_allowed,
 )
+from endoscope_explain.observe.revisits import EVERY_S, LEAST_SHARE, seen_before, strokes
 from endoscope_explain.pipeline import Inputs, Sources, explain_case
+from endoscope_explain.report.visited_once import once_only
 from endoscope_explain.takes import inputs_joined
 
 pytestmark = pytest.mark.engine
@@ -304,6 +307,22 @@ def test_the_commissioning_motion_keeps_to_the_limits_of_the_rig():
     assert motion.largest <= 0.6
     with pytest.raises(MotionRefusedError, match='largest angle is'):
         require_allowed(commissioning(PlantDescription(), RIG), slow)
+
+
+@pytest.mark.parametrize('joint', [0, 1])
+def test_the_commissioning_motion_makes_wide_strokes_again_in_its_second_half(joint):
+    table = commissioning(PlantDescription(), RIG).table
+    every = np.arange(0.0, table.time[-1], TICK)
+    command = np.interp(every, table.time, table.angle[:, joint])
+    wide = [each for each in strokes(command) if abs(each.end - each.start) > 2.4]
+    assert [np.sign(each.end - each.start) for each in wide] == [-1.0, 1.0, -1.0, 1.0]
+    assert all(each.twice for each in wide)
+    assert once_only('bend_x', strokes(command)) == ''
+    # A hold is seen again for as long as it lasts, and judges no branch.
+    seen = seen_before(command)
+    moment = np.arange(len(seen)) * EVERY_S
+    moves = np.abs(np.gradient(np.interp(moment, every, command), EVERY_S)) > 0.05
+    assert np.mean(seen & moves & (moment > 0.5 * every[-1])) > LEAST_SHARE
 
 
 def test_a_rig_that_the_plant_answers_with_too_much_tension_is_not_moved():

@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from endoscope_core.errors import InputError
-from endoscope_core.signals.calibration_motion import calibration_sinusoid
+from endoscope_core.signals.calibration_motion import (
+    CALIBRATION_AMPLITUDE,
+    calibration_sinusoid,
+)
 from endoscope_core.signals.signal import FloatArray, Motion, Signal, hold, move, sequence, window
 
 RAMP_DURATION = 1.0
 CORNER = 0.1
+LOOP = float(np.deg2rad(15.0))
+"""Width of a small reversal loop, less than any tube's backlash, rad; corners take some of it."""
+HOLD_S = 5.0
+"""Wires creep for seconds."""
 
 
 def sum_of_sines(name: str, components: Sequence[tuple[float, float]], duration: float) -> Signal:
@@ -50,20 +58,19 @@ def non_periodic_signal(duration: float = 25.0) -> Signal:
     return sum_of_sines('non_periodic', [(half, 1.0), (half, float(np.sqrt(3.0)))], duration)
 
 
-def triangle(amplitude: float, speed: float) -> Signal:
-    """One slow triangle 0, +a, -a, 0 (rad) at constant `speed` (rad/s), corners rounded.
+def ramps(angles: Sequence[float], speed: float) -> Signal:
+    """From the first angle (rad) through all others at constant `speed` (rad/s), corners rounded.
 
     Constant speed shows friction without inertia or servo lag; a slow one separates creep and
     Stribeck friction from them.
     """
-    legs = [(0.0, amplitude), (amplitude, -amplitude), (-amplitude, 0.0)]
-    knots = np.concatenate(([0.0], np.cumsum([abs(b - a) / speed for a, b in legs]))) + 0.5 * CORNER
-    corner_angle = np.array([0.0, amplitude, -amplitude, 0.0])
-    slopes = np.concatenate(([0.0], np.diff(corner_angle) / np.diff(knots), [0.0]))
+    legs = np.diff(angles)
+    knots = np.concatenate(([0.0], np.cumsum(np.abs(legs) / speed))) + 0.5 * CORNER
+    slopes = np.concatenate(([0.0], speed * np.sign(legs), [0.0]))
     duration = float(knots[-1] + 0.5 * CORNER)
 
     def evaluate(time: FloatArray) -> tuple[FloatArray, FloatArray]:
-        angle = np.zeros_like(time)
+        angle = np.full_like(time, angles[0])
         velocity = np.zeros_like(time)
         for knot, change in zip(knots, np.diff(slopes), strict=True):
             into = np.clip((time - knot) / CORNER + 0.5, 0.0, 1.0)
@@ -72,7 +79,39 @@ def triangle(amplitude: float, speed: float) -> Signal:
             angle += change * (0.5 * CORNER * into**2 + beyond)
         return angle, velocity
 
-    return Signal('triangle', duration, evaluate, (0.5 * CORNER, duration - 0.5 * CORNER))
+    return Signal('ramps', duration, evaluate, (0.5 * CORNER, duration - 0.5 * CORNER))
+
+
+def triangle(amplitude: float, speed: float) -> Signal:
+    """One slow triangle 0, +a, -a, 0 (rad) by :func:`ramps`."""
+    return replace(ramps((0.0, amplitude, -amplitude, 0.0), speed), name='triangle')
+
+
+def there_and_back(reach: float, speed: float) -> Signal:
+    """A rise and a fall between -+`reach` (rad) by :func:`ramps`, which end where they began.
+
+    Both branches of a hysteresis show only in a stroke that is wider than the backlash, and what
+    depends on the bend only in what it is wider by: 40 deg more are enough.
+    """
+    return replace(ramps((0.0, reach, -reach, reach, 0.0), speed), name='there and back')
+
+
+def again_with_hold(reach: float, speed: float) -> Signal:
+    """The strokes of :func:`there_and_back` again, a hold, and one small reversal loop.
+
+    Made some time after these, one visit of a branch is judged by the other. The hold of 5 s
+    tells friction, which stays, from what relaxes: at one speed they are one thing. It is on the
+    way back, as at the end of a stroke an error of a joint stop's form counts all the while. The
+    small loop shows what a reversal does in the middle of a stroke.
+    """
+    return sequence(
+        'there and back again',
+        [
+            ramps((0.0, reach, -reach, reach, 0.5 * reach), speed),
+            hold(HOLD_S, 0.5 * reach),
+            ramps((0.5 * reach, 0.0, LOOP, 0.0), speed),
+        ],
+    )
 
 
 def steps_with_holds(angles: tuple[float, ...], rise: float = 0.15, rest: float = 0.6) -> Signal:
@@ -141,28 +180,39 @@ def teleoperation_like(seed: int, reaches: int, reach: float) -> Signal:
 
 
 def commissioning_motion(seed: int = 1) -> Motion:
-    """Calibration sinusoid, rest, slow triangle, steps, multisine, chirp, teleoperation-like: 52 s.
+    """Wide strokes, sinusoid, steps, chirp, wide strokes again, teleoperation-like part: 48 s.
 
-    `bend_x` moves alone through the first five pieces, so that whatever appears at `bend_y` then is
-    coupling; during the last two both move. The teleoperation-like part is drawn from `seed`.
+    `bend_x` moves alone through the first three pieces, so that whatever appears at `bend_y` then
+    is coupling; that makes the wide strokes, a multisine, and the strokes again. They are those of
+    :func:`there_and_back` and :func:`again_with_hold`. The teleoperation-like part is drawn from
+    `seed`.
     """
     deg = float(np.deg2rad(1.0))
+    reach = 70.0 * deg
+    once, again = there_and_back(reach, reach), again_with_hold(reach, reach)
     alone = [
-        calibration_sinusoid(),
-        hold(1.0),
-        triangle(60.0 * deg, 30.0 * deg),
+        once,
+        # As wide as the strokes, each of its own is made again.
+        calibration_sinusoid().scaled(reach / CALIBRATION_AMPLITUDE),
         steps_with_holds((40.0 * deg, 70.0 * deg, -10.0 * deg, -60.0 * deg, 20.0 * deg)),
-        multisine(60.0 * deg, 8.0),
     ]
     x = sequence(
-        'commissioning', [*alone, chirp(50.0 * deg, 8.0), teleoperation_like(seed, 8, 75.0 * deg)]
+        'commissioning',
+        [
+            *alone,
+            chirp(50.0 * deg, 8.0),
+            again,
+            teleoperation_like(seed, 8, reach),
+        ],
     )
     y = sequence(
         'commissioning',
         [
             hold(sum(part.duration for part in alone)),
-            multisine(60.0 * deg, 8.0),
-            teleoperation_like(seed + 1, 8, 75.0 * deg),
+            once,
+            multisine(60.0 * deg, 6.0),
+            again,
+            teleoperation_like(seed + 1, 4, reach),
         ],
     )
     return Motion('commissioning', {'bend_x': x, 'bend_y': y})

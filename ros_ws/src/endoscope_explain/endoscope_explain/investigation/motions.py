@@ -12,10 +12,10 @@ from endoscope_core.rig import Rig
 from endoscope_core.signals import Signal, hold, sequence
 from endoscope_core.signals.command_file import JOINTS, CommandTable
 from endoscope_core.signals.motions import (
+    again_with_hold,
     chirp,
     steps_with_holds,
-    teleoperation_like,
-    triangle,
+    there_and_back,
 )
 from endoscope_explain.case import NextExperiment
 from endoscope_explain.design import SAMPLE_S, answer_to, as_played, is_safe
@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 
 SHARES = (1.0, 0.75, 0.5, 0.3)
 """Of the commissioning motion's size, the first that is safe."""
+ALONE_S = 3.0
+"""For which `bend_x` moves alone at first: to both ends."""
 TOLERANCE = 1.01
 """Of the greatest speed and acceleration: angles of a file are rounded."""
 
@@ -59,28 +61,23 @@ class Motion:
 
 
 def first_motion() -> dict[str, Signal]:
-    """A slow triangle, steps with rests, free reaches and a chirp, by joint: 25 s.
+    """Wide strokes, a chirp, the strokes again with a hold and a small loop, and steps, by joint.
 
-    Half as long as the motion of `signals.commissioning_motion`, as what it leaves open is asked
-    for by the next one. `bend_y` begins once `bend_x` has moved alone, so that whatever appears on
-    it meanwhile is coupling.
+    28 s and a rest of 1 s, about half as long as `signals.commissioning_motion`, as what it leaves
+    open is asked for by the next one. Its strokes of 140 deg are 40 deg wider than the backlash of
+    the worst class, and come again in its second half, which is what is held out. `bend_y` begins
+    once `bend_x` has moved alone, so that whatever appears on it meanwhile is coupling.
     """
-    x, y = (_pieces(math.radians(size), k) for k, size in enumerate((70.0, 60.0)))
-    waits = hold(x[0].duration)
-    return {
-        'bend_x': sequence(COMMISSIONING, x),
-        'bend_y': sequence(COMMISSIONING, [waits, y[2], y[0], y[3], y[1]]),
-    }
-
-
-def _pieces(reach: float, seed: int) -> list[Signal]:
-    levels = tuple(reach * share for share in (0.5, 1.0, -0.2, -0.9, 0.3))
-    return [
-        triangle(reach, 0.8 * reach),
-        steps_with_holds(levels, 0.2),
-        teleoperation_like(seed, 6, reach),
-        chirp(0.8 * reach, 6.0, 0.3),
-    ]
+    # Rounded corners take 2 deg.
+    reach = math.radians(72.0)
+    speed = 1.1 * reach
+    once, again = there_and_back(reach, speed), again_with_hold(reach, speed)
+    # As quick as the rig of the package may be, and none as wide as the strokes.
+    levels = tuple(reach * share for share in (-0.5, -0.9, 0.2, -0.3, 0.8))
+    steps = steps_with_holds(levels, 0.4, 0.3)
+    x = [once, chirp(0.8 * reach, 6.0, 0.3), again, steps]
+    y = [hold(ALONE_S), once, chirp(0.8 * reach, 4.0, 0.3), again, steps]
+    return {'bend_x': sequence(COMMISSIONING, x), 'bend_y': sequence(COMMISSIONING, y)}
 
 
 def commissioning(plant: PlantDescription, rig: Rig) -> Motion:
