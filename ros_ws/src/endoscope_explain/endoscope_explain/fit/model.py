@@ -19,7 +19,15 @@ from endoscope_core.physics.packing import pack
 from endoscope_core.physics.simulator import TICK
 from endoscope_explain.fit.family import Family
 from endoscope_explain.fit.free_parameters import COEFFICIENT, COORDINATE, LEAD, FreeParameter
-from endoscope_explain.fit.solver import STEP, Effort, Ended, Minimum, Renewal, minimise
+from endoscope_explain.fit.solver import (
+    STEP,
+    Effort,
+    Ended,
+    Minimum,
+    Renewal,
+    Secants,
+    minimise,
+)
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.observe.simulated import simulate_joints
 
@@ -156,8 +164,15 @@ class JointModel:
 
     def residuals_of(self, parameters: Array, lead: float) -> Array:
         """Residuals (size,) in noise units of packed parameters and a reading lead."""
+        return self.read(self.outputs(parameters), parameters, lead)
+
+    def outputs(self, parameters: Array) -> Array:
+        """Simulated outputs (N, OUTPUTS) of packed parameters."""
+        return simulate_joint(self.observation, parameters, self.flags)
+
+    def read(self, outputs: Array, parameters: Array, lead: float) -> Array:
+        """Residuals (size,) in noise units of simulated outputs, read with a lead."""
         skew = parameters[CLOCK_RATE.first_parameter] if self.flags[CLOCK_RATE.flag] else 0.0
-        outputs = simulate_joint(self.observation, parameters, self.flags)
         found = residuals(self.observation, outputs, lead, skew)
         return found if self.offset is None else found + self.offset
 
@@ -255,7 +270,9 @@ def jacobian(model: JointModel, theta: Array, columns: list[int] | None = None) 
     low, high = model.bounds()
     columns = list(range(len(theta))) if columns is None else columns
     coarse = model.on_coarse_ticks()
-    at = coarse.residuals(theta)
+    parameters, lead = coarse.packed(theta)
+    outputs = coarse.outputs(parameters)
+    at = coarse.read(outputs, parameters, lead)
     result = np.empty((len(at), len(columns)))
     for i, c in enumerate(columns):
         moved = theta.copy()
@@ -263,7 +280,11 @@ def jacobian(model: JointModel, theta: Array, columns: list[int] | None = None) 
         step = min(step, 0.5 * (high[c] - low[c]))
         step = step if theta[c] + step <= high[c] else -step
         moved[c] += step
-        result[:, i] = (coarse.residuals(moved) - at) / (moved[c] - theta[c])
+        parameters, lead = coarse.packed(moved)
+        # When a reading was taken is nothing that moves the rig.
+        moves = model.free[c].index != LEAD
+        seen = coarse.read(coarse.outputs(parameters) if moves else outputs, parameters, lead)
+        result[:, i] = (seen - at) / (moved[c] - theta[c])
     return result
 
 
@@ -292,8 +313,9 @@ def fit(
     """Fit the free parameters of a joint from coordinates (n,), residuals times `weight`."""
     # Weights are at most 1, where an error of form is allowed for. It stops when a step lowers the
     # cost by less than the tolerance's share.
+    known = None if known_jacobian is None else Secants.at(known_jacobian, weight)
     objective = _OneJoint(model, weight)
-    return _fit_of(model, minimise(objective, start, Effort(iterations, tolerance), known_jacobian))
+    return _fit_of(model, minimise(objective, start, Effort(iterations, tolerance), known))
 
 
 def broyden_fit(
@@ -305,15 +327,16 @@ def broyden_fit(
 ) -> Fit:
     """Fit by few simulations: a derivative that is known near `start` is updated, never renewed."""
     effort = Effort(steps, renewal=Renewal.NEVER)
-    return _fit_of(model, minimise(_OneJoint(model, weight), start, effort, known_jacobian))
+    known = Secants.at(known_jacobian, weight)
+    return _fit_of(model, minimise(_OneJoint(model, weight), start, effort, known))
 
 
-def _fit_of(model: JointModel, found: Minimum[Array, Array]) -> Fit:
+def _fit_of(model: JointModel, found: Minimum[Array, Secants]) -> Fit:
     return Fit(
         model,
         found.theta,
         found.residuals,
-        found.derivative,
+        found.derivative.whole,
         found.cost,
         steps=found.steps,
         ended=found.ended,
@@ -332,22 +355,20 @@ class _OneJoint:
         residuals = self.model.residuals(theta)
         return residuals, self.model.cost(self._weighted(residuals), theta)
 
-    def derivative(self, theta: Array, residuals: Array, stride: float) -> Array:
-        return jacobian(self.model, theta)
+    def derivative(self, theta: Array, residuals: Array, stride: float) -> Secants:
+        return Secants.at(jacobian(self.model, theta), self.weight)
 
     def normal_equations(
-        self, theta: Array, residuals: Array, derivative: Array
+        self, theta: Array, residuals: Array, derivative: Secants
     ) -> tuple[Array, Array]:
-        weighted = derivative if self.weight is None else derivative * self.weight[:, None]
         prior_weight = self.model.prior_weight()
         return (
-            weighted.T @ weighted + np.diag(prior_weight**2),
-            weighted.T @ self._weighted(residuals) + prior_weight * self.model.prior(theta),
+            derivative.gram + np.diag(prior_weight**2),
+            derivative.towards(residuals) + prior_weight * self.model.prior(theta),
         )
 
-    def updated(self, derivative: Array, step: Array, before: Array, after: Array) -> Array:
-        missed = after - before - derivative @ step
-        return derivative + np.outer(missed / float(step @ step), step)
+    def updated(self, derivative: Secants, step: Array, before: Array, after: Array) -> Secants:
+        return derivative.updated(step, before, after)
 
     def _weighted(self, residuals: Array) -> Array:
         return residuals if self.weight is None else self.weight * residuals

@@ -5,7 +5,7 @@ over which a derivative says anything. Between exact derivatives, which cost a s
 coordinate, Broyden's rank-one update follows the steps (Broyden, Math. Comp. 19, 1965).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, StrEnum, auto
 from typing import Protocol
 
@@ -19,8 +19,9 @@ STEP = 5.0e-4
 one of 1 % ends a fit at its wall."""
 LONGEST_STEP = 0.7
 """Largest step of a coordinate: further away the derivative says little."""
-SLOW = 0.2
-"""An approximate derivative is renewed once a step lowers the cost by less than this share."""
+TRUSTED = 0.5
+"""Share of the decrease that an approximate derivative promised below which it is renewed: half way
+between a derivative that foretells what a step does and one that says nothing."""
 TRIES, TRIES_BY_ESTIMATE = 6, 2
 """How often a step that does not lower the cost is shortened, by the quality of the derivative."""
 _FIRST_DAMPING, _LEAST_DAMPING, _RESTARTED_DAMPING = 1e-4, 1e-7, 1e-3
@@ -32,7 +33,7 @@ class Renewal(Enum):
     """When the derivative is worked out again."""
 
     NEVER = auto()
-    WHEN_SLOW = auto()
+    WHEN_WRONG = auto()
     ALWAYS = auto()
 
 
@@ -48,12 +49,12 @@ class Ended(StrEnum):
 class Effort:
     """How long a fit goes on."""
 
-    iterations: int = 8  # largest number of steps
+    iterations: int = 8  # largest number of steps, not counting those by an estimate
     tolerance: float = 1e-3  # stop when a step lowers the cost by less than this share
     # Difference steps, each used until it leads no further: the misfit is rough on a small scale,
     # and a longer step looks over that.
     strides: tuple[float, ...] = (STEP,)
-    renewal: Renewal = Renewal.WHEN_SLOW
+    renewal: Renewal = Renewal.WHEN_WRONG
 
 
 class Objective[R, D](Protocol):
@@ -79,6 +80,54 @@ class Objective[R, D](Protocol):
 
 
 @dataclass(frozen=True)
+class Secants:
+    """A derivative (size, n), and what rank-one updates have added to it since.
+
+    The updates stay apart, and the matrix of the normal equations follows them, so that a step
+    costs a product with vectors instead of one with a matrix as tall as the data.
+    """
+
+    exact: Array  # (size, n)
+    squared: Array  # (size,), weights of the residuals, squared
+    gram: Array  # (n, n), of the weighted derivative with its updates
+    updates: tuple[tuple[Array, Array], ...] = ()  # each the outer product of (size,) and (n,)
+
+    @classmethod
+    def at(cls, exact: Array, weight: Array | None) -> 'Secants':
+        """A derivative (size, n) before any update, of residuals to be weighted by `weight`."""
+        squared = np.ones(len(exact)) if weight is None else weight**2
+        weighted = exact if weight is None else exact * weight[:, None]
+        return cls(exact, squared, weighted.T @ weighted)
+
+    @property
+    def whole(self) -> Array:
+        """The derivative (size, n) with its updates."""
+        if not self.updates:
+            return self.exact
+        tall, wide = (np.stack(part, axis=1) for part in zip(*self.updates, strict=True))
+        return np.asarray(self.exact + tall @ wide.T)
+
+    def towards(self, residuals: Array) -> Array:
+        """Gradient (n,) of half the weighted squares of residuals (size,)."""
+        weighted = self.squared * residuals
+        found = self.exact.T @ weighted
+        for tall, wide in self.updates:
+            found += wide * float(tall @ weighted)
+        return np.asarray(found)
+
+    def updated(self, step: Array, before: Array, after: Array) -> 'Secants':
+        """The derivative that foretells what a step (n,) did (Broyden, Math. Comp. 19, 1965)."""
+        foretold = self.exact @ step
+        for tall, wide in self.updates:
+            foretold += tall * float(wide @ step)
+        missed = (after - before - foretold) / float(step @ step)
+        across = np.outer(self.towards(missed), step)
+        own = float(missed @ (self.squared * missed))
+        gram = self.gram + across + across.T + own * np.outer(step, step)
+        return replace(self, gram=gram, updates=(*self.updates, (missed, step)))
+
+
+@dataclass(frozen=True)
 class Minimum[R, D]:
     """Where a fit ended."""
 
@@ -101,20 +150,25 @@ def minimise[R, D](
     exact = known is None
     derivative = objective.derivative(theta, residuals, strides[0]) if known is None else known
     damping = _FIRST_DAMPING
-    steps, ended = 0, Ended.SPENT
-    while steps < effort.iterations:
+    steps = iterations = estimated = 0
+    ended = Ended.SPENT
+    while iterations < effort.iterations:
         steps += 1
+        # As many steps as there are coordinates cost what a derivative does.
+        estimated = 0 if exact else estimated + 1
+        iterations += exact or renewal is Renewal.NEVER
         damping = min(damping, _LARGEST_AT_FIRST) if exact else damping
-        before, accepted = cost, False
+        before, promised, accepted = cost, 0.0, False
         normal, gradient = objective.normal_equations(theta, residuals, derivative)
         for _ in range(1 if renewal is Renewal.NEVER else TRIES if exact else TRIES_BY_ESTIMATE):
             damped = normal + damping * np.diag(np.maximum(np.diag(normal), 1e-9))
             step = bounded_step(damped, gradient, theta, low, high)
+            promised = -float(gradient @ step + 0.5 * step @ normal @ step)
             if float(step @ step) < _NO_STEP:
                 break
             trial, trial_cost = objective.evaluate(theta + step)
             accepted = trial_cost < cost
-            if renewal is Renewal.NEVER or (accepted and renewal is Renewal.WHEN_SLOW):
+            if renewal is Renewal.NEVER or (accepted and renewal is Renewal.WHEN_WRONG):
                 derivative = objective.updated(derivative, step, residuals, trial)
             if accepted:
                 theta, residuals, cost = theta + step, trial, trial_cost
@@ -129,7 +183,8 @@ def minimise[R, D](
             if not strides:
                 ended = Ended.CONVERGED if accepted else Ended.NO_STEP
                 break
-        exact = renewal is Renewal.ALWAYS or gained < SLOW * before
+        foretold = accepted and gained >= max(TRUSTED * promised, effort.tolerance * before)
+        exact = renewal is Renewal.ALWAYS or not foretold or estimated >= len(theta)
         if exact:
             derivative = objective.derivative(theta, residuals, strides[0])
     if not exact and renewal is not Renewal.NEVER:
