@@ -119,15 +119,6 @@ def test_one_that_was_cut_off_has_its_reason_and_can_be_recovered(tmp_path):
     assert 'endoscope bag recover' in entry.trouble
 
 
-def test_an_empty_ring_leaves_a_bag_of_what_was_in_force(tmp_path):
-    recent = filled()
-    recent.add([], {STATE}, START + 60_000 * MS)
-    event = EventBag(recent, MARK, START + 60_000 * MS, 'rest')
-    event.begin(session_in(tmp_path, MARK))
-    path = event.close().path
-    assert [m.topic for m in open_bag(path).messages()] == ['/state']
-
-
 def test_no_more_are_written_than_may_be_and_none_is_deleted(tmp_path):
     for _ in range(3):
         new_event_bag(tmp_path, FAULT, 3).mkdir()

@@ -44,12 +44,6 @@ def test_tells_equation_source_and_parameters(capsys):
     )
 
 
-def test_tells_what_counted_parameters_stand_for(capsys):
-    assert main(['effects', 'configuration_change']) == 0
-    told = ' '.join(capsys.readouterr().out.split())
-    assert 'smooth 0: changes evenly, 1: changes smoothly, typical 0' in told
-
-
 def test_an_unknown_effect_is_one_line_and_exit_2(capsys):
     assert main(['effects', 'joint_stp']) == 2
     err = capsys.readouterr().err

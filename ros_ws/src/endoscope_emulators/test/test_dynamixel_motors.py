@@ -193,15 +193,6 @@ def test_an_adapter_that_goes_away_under_the_doctor_is_named(port_that_goes_away
     assert 'the adapter is gone' in advice
 
 
-def test_four_and_a_half_megabaud():
-    with EmulatorProcess(baud=4_500_000) as emulator:
-        motors = opened(BusSettings(emulator.port, 4_500_000), MOUNTS)
-        try:
-            drive(motors, (0.0, 0.0), lambda: motors.bus.figures.readings > 50)
-        finally:
-            motors.close()
-
-
 @pytest.fixture
 def line():
     with EmulatedBus([EmulatedServo(1)]) as line:
@@ -277,10 +268,6 @@ def test_the_alert_bit_is_kept_with_the_value(line, handler):
     reply = handler.read(1, 132, 4)
     assert reply.error == ALERT
     assert reply.data == (2048).to_bytes(4, 'little')
-
-
-def test_emulated_servos_are_not_taken_for_real_ones(motors):
-    assert motors.kind is Kind.EMULATED
 
 
 @pytest.mark.parametrize(('marked', 'kind'), [((), Kind.REAL), ((2,), Kind.EMULATED)])

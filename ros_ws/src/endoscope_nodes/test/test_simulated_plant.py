@@ -70,13 +70,3 @@ def test_a_file_is_named_by_its_whole_path_for_programs_in_other_folders(tmp_pat
         node = runtime.add(MotorDriverNode)
         assert node.get_parameter('plant_file').value == str(plant)
         assert node.get_parameter('rig_file').value == str(tmp_path / 'rig.yaml')
-
-
-def test_a_device_that_the_rig_file_names_is_looked_for(tmp_path):
-    rig = tmp_path / 'rig.yaml'
-    rig.write_text('devices: {motors: dynamixel}')
-    with (
-        Runtime(['--ros-args', '-p', f'rig_file:={rig}'], Context(), 77) as runtime,
-        pytest.raises(ParameterError, match='/dev/ttyUSB0: there is no such port'),
-    ):
-        runtime.add(MotorDriverNode)
