@@ -66,24 +66,15 @@ def written(folder):
     return report.path
 
 
-def test_it_has_what_came_before_and_after(tmp_path):
-    bag = open_bag(written(tmp_path))
-    texts = [m.data for _, m in bag.decoded('/stream')]
-    assert texts == [f'0 {k}' for k in range(3999, 5100)]
-
-
-def test_what_was_in_force_stands_first(tmp_path):
-    first = next(open_bag(written(tmp_path)).messages())
-    assert first.topic == '/state'
-    assert first.data == encode_string('1 0')
-    # When it was published is not made up.
-    assert first.publish_ns == START
-    assert first.log_ns == START + 3999 * MS
-
-
-def test_why_it_was_kept_stands_in_it(tmp_path):
+def test_it_has_what_was_in_force_what_came_before_and_after_and_why_it_was_kept(tmp_path):
     path = written(tmp_path)
-    events = events_of(open_bag(path).metadata)
+    bag = open_bag(path)
+    first = next(bag.messages())
+    assert (first.topic, first.data) == ('/state', encode_string('1 0'))
+    # When it was published is not made up.
+    assert (first.publish_ns, first.log_ns) == (START, START + 3999 * MS)
+    assert [m.data for _, m in bag.decoded('/stream')] == [f'0 {k}' for k in range(3999, 5100)]
+    events = events_of(bag.metadata)
     assert events == [
         Event(FAULT, START + 4999 * MS, REASON),
         Event(MARK, START + 5001 * MS, 'seen by the operator'),

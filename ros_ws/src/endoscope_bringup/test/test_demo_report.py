@@ -117,13 +117,12 @@ def test_the_best_method_comes_first_by_its_numbers():
     assert figures_table(rows).count('*') == len(rows)
 
 
-def test_the_best_of_a_row_is_marked_on_the_page(page, results):
-    marked = re.findall(r'<td class="best">([\d.]+)', page)
-    rows = table_rows(results)
-    assert marked == [
-        f'{row.values[m]:.2f}' for row in rows for m in ranking(rows) if row.is_best(m)
-    ]
-    assert len(marked) >= len(rows)
+def test_the_page_says_whose_equations_the_inverse_uses(page):
+    text = ' '.join(page.split())
+    assert 'uses the equations by which these tubes are simulated' in text
+    # test_another_simulator.py of the lab measures these.
+    assert 'In three tubes of another simulator it left 1 to 2 %' in text
+    assert 'the Bouc-Wen model of the class 16 to 30 %' in text
 
 
 def test_no_method_is_praised_where_none_helps():
