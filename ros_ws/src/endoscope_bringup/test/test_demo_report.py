@@ -17,13 +17,7 @@ from endoscope_bringup.demo.analysis import (
     start_of_motion,
 )
 from endoscope_bringup.demo.page import endoscope_picture, report_page
-from endoscope_bringup.demo.procedure import (
-    MOTIONS,
-    TUBES,
-    CalibrationFacts,
-    Method,
-    Segment,
-)
+from endoscope_bringup.demo.procedure import MOTIONS, TUBES, CalibrationFacts, Method, Segment
 from endoscope_bringup.demo.results import (
     CalibrationOutcome,
     Crossing,

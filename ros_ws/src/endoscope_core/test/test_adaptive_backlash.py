@@ -79,12 +79,7 @@ def test_an_unusable_measurement_is_counted_and_ignored(measurement):
 
 @pytest.mark.parametrize(
     'inputs',
-    [
-        (0.1, [0.0], [0.0]),
-        (math.nan, [0.0], [0.0]),
-        (0.3, [math.inf], [0.0]),
-        (0.3, [0.0], []),
-    ],
+    [(0.1, [0.0], [0.0]), (math.nan, [0.0], [0.0]), (0.3, [math.inf], [0.0]), (0.3, [0.0], [])],
 )
 def test_bad_input_is_refused(inputs):
     controller = AdaptiveBacklashController(1)

@@ -2,11 +2,7 @@ import numpy as np
 import pytest
 
 from endoscope_core.calibration import BendingRecord, CalibrationRun, CalibrationStep
-from endoscope_core.signals import (
-    BRIEF,
-    calibration_motion,
-    calibration_sinusoid,
-)
+from endoscope_core.signals import BRIEF, calibration_motion, calibration_sinusoid
 
 MS = 1_000_000
 

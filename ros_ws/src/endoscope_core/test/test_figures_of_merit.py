@@ -45,11 +45,7 @@ def test_rmse():
 
 @pytest.mark.parametrize(
     ('desired', 'actual', 'complaint'),
-    [
-        ([0.0], [0.0, 1.0], 'must be equal'),
-        ([], [], 'no samples'),
-        ([0.0], [np.inf], 'not finite'),
-    ],
+    [([0.0], [0.0, 1.0], 'must be equal'), ([], [], 'no samples'), ([0.0], [np.inf], 'not finite')],
 )
 def test_rmse_refuses(desired, actual, complaint):
     with pytest.raises(ValueError, match=complaint):

@@ -184,8 +184,7 @@ numbers = st.floats(allow_nan=True, allow_infinity=True)
 
 @given(
     st.lists(
-        st.tuples(st.integers(-(10**18), 10**18), numbers, st.integers(0, 200 * MS)),
-        max_size=40,
+        st.tuples(st.integers(-(10**18), 10**18), numbers, st.integers(0, 200 * MS)), max_size=40
     )
 )
 def test_whatever_comes_the_slave_stays_within_its_limits(samples):

@@ -6,13 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from endoscope_core.physics import (
-    EffectSpec,
-    JointParameters,
-    PlantDescription,
-    TermSpec,
-    simulate,
-)
+from endoscope_core.physics import EffectSpec, JointParameters, PlantDescription, TermSpec, simulate
 from endoscope_core.physics.folds import folded
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.evaluation import function_at

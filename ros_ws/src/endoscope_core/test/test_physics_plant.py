@@ -38,9 +38,7 @@ def test_a_coarse_tick_costs_little(joint):
     command = shaft_command(60.0, time=coarse) + shaft_command(10.0, 7.0, coarse)
     fine = run(joint, np.repeat(command, 5, axis=0))
     assert_allclose(
-        run(joint, command, 5 * TICK).bending_true,
-        fine.bending_true[::5],
-        atol=np.deg2rad(0.05),
+        run(joint, command, 5 * TICK).bending_true, fine.bending_true[::5], atol=np.deg2rad(0.05)
     )
 
 

@@ -26,10 +26,7 @@ from endoscope_core.rig import shipped_rig
 
 TICK = 1e-3
 LIMITS = MotorLimits.of(shipped_rig())
-FEEDBACK = {
-    'alone': None,
-    'adaptive': AdaptiveBacklashController,
-}
+FEEDBACK = {'alone': None, 'adaptive': AdaptiveBacklashController}
 # Every mode alone, and at the slowest rate what amplifies most; test_handle.py has the other rates.
 CASES = [(mode, 'alone', 1000) for mode in MODES]
 CASES += [(mode, 'adaptive', 50) for mode in ('none', 'bouc_wen', 'physical')]
@@ -67,10 +64,7 @@ def tip_and_shafts(wanted, mode, feedback):
     """Tip angles (N, 2) and shaft commands (N, 2) of the nominal rig with a tracker of 40 Hz."""
     plant = PlantDescription()
     rig, sensors = PlantSimulator(plant, TICK), SensorModel(plant.sensors, 1)
-    motion, feedforward = (
-        DesiredMotion(2),
-        Feedforward(2, FeedforwardSettings(LIMITS)),
-    )
+    motion, feedforward = (DesiredMotion(2), Feedforward(2, FeedforwardSettings(LIMITS)))
     plants = tuple(map(PhysicalParameters, plant.joints.values()))
     by = 'plant' if 'physical' in mode else 'class'
     findings = CalibrationFindings(class_deg=70, plants=plants)

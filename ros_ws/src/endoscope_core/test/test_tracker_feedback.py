@@ -36,11 +36,7 @@ def test_at_rest_it_stays_when_measurements_return_or_say_something_else(at_rest
 
 def test_at_rest_it_stays_when_it_is_switched_off_and_on_and_forgets(at_rest):
     drive, angle, before = at_rest
-    for change in (
-        drive.controller.deactivate,
-        drive.controller.forget,
-        drive.controller.activate,
-    ):
+    for change in (drive.controller.deactivate, drive.controller.forget, drive.controller.activate):
         change()
         _, corrections = drive.run(1.0, lambda _: angle)
         assert np.all(corrections == before)

@@ -8,13 +8,7 @@ from wrong_way import wrong_way_motion
 
 from endoscope_core.errors import FileError, InputError
 from endoscope_core.physics import PlantDescription, simulate
-from endoscope_core.physics.family import (
-    CENTRE,
-    MOST_BENT,
-    TubeFamily,
-    load_family,
-    shipped_family,
-)
+from endoscope_core.physics.family import CENTRE, MOST_BENT, TubeFamily, load_family, shipped_family
 
 TICK = 5e-3
 

@@ -10,12 +10,7 @@ from endoscope_core.control import PhysicalParameters
 from endoscope_core.errors import FileError, InputError
 from endoscope_core.hysteresis import BoucWenParameters, DahlParameters
 from endoscope_core.hysteresis.memory_model import GREATEST_INVERSE_SLOPE
-from endoscope_core.identification import (
-    KINDS,
-    TableEntry,
-    UpdatedTable,
-    blend,
-)
+from endoscope_core.identification import KINDS, TableEntry, UpdatedTable, blend
 from endoscope_core.physics import JointParameters
 
 OTHER = {

@@ -4,17 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from endoscope_devices.dynamixel.control_table import (
-    CURRENT_LIMIT,
-    GOAL_CURRENT,
-    GOAL_POSITION,
-)
-from endoscope_devices.dynamixel.packet import (
-    STATUS,
-    Instruction,
-    PacketReader,
-    encode,
-)
+from endoscope_devices.dynamixel.control_table import CURRENT_LIMIT, GOAL_CURRENT, GOAL_POSITION
+from endoscope_devices.dynamixel.packet import STATUS, Instruction, PacketReader, encode
 
 # Manual: 'Protocol 2.0', Ping, Read, Status, Reboot; the last is a write whose data look like a
 # header.

@@ -127,10 +127,7 @@ def test_a_setting_that_is_not_kept_is_refused_by_name(emulator):
 def test_torque_that_does_not_come_on_is_refused(emulator, motors):
     emulator.do('stick', 1, 64)
     drive(
-        motors,
-        (0.0, 0.0),
-        lambda: 'does not switch its torque on' in motors.trouble(),
-        arming=True,
+        motors, (0.0, 0.0), lambda: 'does not switch its torque on' in motors.trouble(), arming=True
     )
     assert not motors.bus.armed
 
@@ -215,10 +212,7 @@ def test_a_goal_that_is_not_where_the_shaft_is_is_refused(line):
             line.servos[1].stuck = {116}
         drive(motors, (0.2,), near(motors, (0.2,)))
         drive(
-            motors,
-            (0.2,),
-            lambda: 'Goal Position(116) reads 2048' in motors.trouble(),
-            arming=True,
+            motors, (0.2,), lambda: 'Goal Position(116) reads 2048' in motors.trouble(), arming=True
         )
         assert line.servos[1].value(TORQUE_ENABLE) == 0
         assert not motors.bus.armed

@@ -18,16 +18,8 @@ from endoscope_core.signals.command_file import JOINTS, CommandTable, read_comma
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.explanation import Verdict
 from endoscope_explain.investigation import page
-from endoscope_explain.investigation.investigation import (
-    Investigation,
-    investigate,
-)
-from endoscope_explain.investigation.log import (
-    LOG_MD,
-    PLANT,
-    Stop,
-    begun,
-)
+from endoscope_explain.investigation.investigation import Investigation, investigate
+from endoscope_explain.investigation.log import LOG_MD, PLANT, Stop, begun
 from endoscope_explain.investigation.motions import (
     Motion,
     MotionRefusedError,

@@ -8,13 +8,7 @@ from endoscope_core.rig import shipped_rig
 from endoscope_core.signals.command_file import JOINTS, CommandTable
 from endoscope_explain.investigation.motions import Motion, commissioning, require_allowed
 from endoscope_explain.takes import recordings_joined
-from endoscope_lab.investigate import (
-    FIXED,
-    KINDS,
-    SimulatedRig,
-    drawn_rig,
-    fixed_motion,
-)
+from endoscope_lab.investigate import FIXED, KINDS, SimulatedRig, drawn_rig, fixed_motion
 
 RIG = shipped_rig()
 

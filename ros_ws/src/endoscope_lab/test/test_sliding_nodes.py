@@ -6,12 +6,7 @@ import pytest
 from outside_data import CASES, needs
 from scipy.interpolate import CubicSpline
 
-from endoscope_lab.concealed.sliding_nodes import (
-    NOMINAL,
-    follow,
-    move_wire,
-    simulate,
-)
+from endoscope_lab.concealed.sliding_nodes import NOMINAL, follow, move_wire, simulate
 
 REFERENCE = CASES / 'sheath' / 'reference'
 

@@ -4,12 +4,7 @@ import pytest
 
 from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_lab.papers.tracking_trial import calibrate, never_seen_tube
-from endoscope_lab.validity import (
-    Slow,
-    creeping,
-    is_told,
-    plant_after,
-)
+from endoscope_lab.validity import Slow, creeping, is_told, plant_after
 
 
 def test_wires_that_are_tightened_again_creep_again():

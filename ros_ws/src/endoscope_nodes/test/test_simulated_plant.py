@@ -48,10 +48,7 @@ def test_a_process_has_the_plant_and_seed_of_its_rig_file_unless_told_otherwise(
     rig = tmp_path / 'rig.yaml'
     rig.write_text('simulation: {plant: own.yaml, seed: 7}')
     other = saved(tmp_path, 'other.yaml', 0.6)
-    for more, exponent, seed in (
-        ({}, 0.3, 8),
-        ({'plant_file': str(other), 'seed': 0}, 0.6, 1),
-    ):
+    for more, exponent, seed in (({}, 0.3, 8), ({'plant_file': str(other), 'seed': 0}, 0.6, 1)):
         overrides = {'motor_driver': {'rig_file': str(rig), **more}}
         args = ['--ros-args', '-p', 'use_sim_time:=true', '--log-level', 'fatal']
         with Runtime(args, Context(), 77, overrides) as runtime:

@@ -6,13 +6,7 @@ import pytest
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.layout import IN_COMMAND
 from endoscope_explain.observe.observation import observe
-from endoscope_explain.observe.revisits import (
-    GAP_S,
-    held_out,
-    motion_repeats,
-    seen_before,
-    strokes,
-)
+from endoscope_explain.observe.revisits import GAP_S, held_out, motion_repeats, seen_before, strokes
 
 TIME = 1e-3 * np.arange(40_000)
 CYCLE = 2.0 * np.pi
