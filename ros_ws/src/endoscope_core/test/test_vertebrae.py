@@ -4,6 +4,7 @@ import math
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -86,3 +87,8 @@ def test_every_joint_of_an_axis_turns_by_the_same_angle_within_its_limits():
         if j.get('type') == 'revolute'
     }
     assert all(abs(angle) < limits[name] for name, angle in angles.items())
+
+
+def test_refuses_half_a_turn():
+    with pytest.raises(ValueError, match='half a turn'):
+        SECTION.joint_angles((math.pi, 0.1))
