@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from driven_play import PERIOD, TICK, DrivenPlay
 
+from endoscope_core.control.limits import SHARE_OF_TRAVEL
+
 
 @pytest.fixture
 def at_rest():
@@ -41,6 +43,26 @@ def test_at_rest_it_stays_when_it_is_switched_off_and_on_and_forgets(at_rest):
         _, corrections = drive.run(1.0, lambda _: angle)
         assert np.all(corrections == before)
         assert not drive.controller.faded
+
+
+def test_a_tracker_that_was_gone_moves_the_correction_no_faster_than_stated():
+    drive = DrivenPlay()
+    drive.run(10.0, math.sin)
+    learnt = drive.controller.learnt
+    # One way only, so that the law itself has no reason to turn.
+    way = math.copysign(0.25, math.cos(10.0))
+
+    def on(time):
+        return math.sin(10.0) + way * (time - 10.0)
+
+    _, gone = drive.run(1.5, on, tracker=False)
+    assert drive.controller.learnt == learnt
+    assert drive.controller.weight < 1.0
+    _, back = drive.run(1.5, on)
+    step = np.abs(np.diff(np.concatenate([gone, back])))
+    gain = max(abs(g) for g, _ in (*learnt, *drive.controller.learnt))
+    # The direction's memory may still be turning within the first few degrees.
+    assert np.max(step[400:]) <= (gain + 2.0 * SHARE_OF_TRAVEL) * 0.25 * TICK
 
 
 def test_the_first_measurement_after_a_gap_teaches_nothing():

@@ -141,3 +141,12 @@ def test_the_current_limit_stops_the_shaft_and_overload_lets_it_go():
     assert servo.value(table.TORQUE_ENABLE) == 0
     assert servo.alert() == 0x80
     assert servo.write(table.TORQUE_ENABLE.address, b'\x01') != 0
+
+
+def test_the_tick_counts_milliseconds_and_begins_anew():
+    servo = EmulatedServo(1)
+    servo.advance(100.0)
+    servo.advance(100.25)
+    assert servo.value(table.REALTIME_TICK) == 250
+    servo.advance(100.0 + 32.768 + 0.007)
+    assert servo.value(table.REALTIME_TICK) == 7
