@@ -66,24 +66,15 @@ def written(folder):
     return report.path
 
 
-def test_it_has_what_came_before_and_after(tmp_path):
-    bag = open_bag(written(tmp_path))
-    texts = [m.data for _, m in bag.decoded('/stream')]
-    assert texts == [f'0 {k}' for k in range(3999, 5100)]
-
-
-def test_what_was_in_force_stands_first(tmp_path):
-    first = next(open_bag(written(tmp_path)).messages())
-    assert first.topic == '/state'
-    assert first.data == encode_string('1 0')
-    # When it was published is not made up.
-    assert first.publish_ns == START
-    assert first.log_ns == START + 3999 * MS
-
-
-def test_why_it_was_kept_stands_in_it(tmp_path):
+def test_it_has_what_was_in_force_what_came_before_and_after_and_why_it_was_kept(tmp_path):
     path = written(tmp_path)
-    events = events_of(open_bag(path).metadata)
+    bag = open_bag(path)
+    first = next(bag.messages())
+    assert (first.topic, first.data) == ('/state', encode_string('1 0'))
+    # When it was published is not made up.
+    assert (first.publish_ns, first.log_ns) == (START, START + 3999 * MS)
+    assert [m.data for _, m in bag.decoded('/stream')] == [f'0 {k}' for k in range(3999, 5100)]
+    events = events_of(bag.metadata)
     assert events == [
         Event(FAULT, START + 4999 * MS, REASON),
         Event(MARK, START + 5001 * MS, 'seen by the operator'),
@@ -117,15 +108,6 @@ def test_one_that_was_cut_off_has_its_reason_and_can_be_recovered(tmp_path):
     [entry] = [entry for entry in bags_in(tmp_path) if entry.name == path.name]
     assert (entry.kind, entry.events[0].reason) == (FAULT, REASON)
     assert 'endoscope bag recover' in entry.trouble
-
-
-def test_an_empty_ring_leaves_a_bag_of_what_was_in_force(tmp_path):
-    recent = filled()
-    recent.add([], {STATE}, START + 60_000 * MS)
-    event = EventBag(recent, MARK, START + 60_000 * MS, 'rest')
-    event.begin(session_in(tmp_path, MARK))
-    path = event.close().path
-    assert [m.topic for m in open_bag(path).messages()] == ['/state']
 
 
 def test_no_more_are_written_than_may_be_and_none_is_deleted(tmp_path):

@@ -101,25 +101,3 @@ def test_an_occasional_topic_has_no_silences(tmp_path):
     state = topic(write(tmp_path / 'bag', range(10)), '/e/state')
     assert (state.rate_hz, state.longest_silence_s, state.duration_s) == (None, None, 0)
     assert (state.pauses, state.gaps) == (0, 0)
-
-
-def test_the_text_is_a_table(tmp_path):
-    lines = str(bag_information(open_bag(write(tmp_path / 'bag', range(50))))).splitlines()
-    assert lines[0].endswith('bag: 51 messages over 0.050 s')
-    assert lines[1] == 'from 2026-09-21T14:13:20.000000000 UTC, written by endoscope_bags'
-    assert lines[2] == 'rig: unknown'
-    assert lines[3].split()[:3] == ['topic', 'type', 'messages']
-    assert lines[4].split() == [
-        '/e/servo_jp',
-        'sensor_msgs/msg/JointState',
-        '50',
-        '1000',
-        'Hz',
-        '0.049',
-        's',
-        '0',
-        '0',
-        '0.001',
-        's',
-        '0',
-    ]

@@ -1,6 +1,5 @@
 """Saving what is sound of a damaged recording."""
 
-import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -8,7 +7,7 @@ from hypothesis import strategies as st
 from endoscope_bags import BagWriter, open_bag
 from endoscope_bags.cdr_encoding import encode_string
 from endoscope_bags.copying import recover
-from endoscope_bags.errors import BagError, BagExistsError, BagNotFoundError
+from endoscope_bags.errors import BagError, BagNotFoundError
 from endoscope_bags.message_types import STRING, MessageType
 from endoscope_bags.topic import LATCHED_QOS
 
@@ -111,11 +110,3 @@ def test_nothing_is_left_where_nothing_can_be_saved(tmp_path):
     with pytest.raises(BagNotFoundError):
         recover(tmp_path / 'absent', tmp_path / 'out')
     assert [p.name for p in tmp_path.iterdir()] == ['text']
-
-
-def test_an_existing_target_is_left_alone(whole, tmp_path):
-    (tmp_path / 'a.mcap').write_bytes(whole)
-    before = np.frombuffer(whole, np.uint8).sum()
-    with pytest.raises(BagExistsError):
-        recover(tmp_path / 'a.mcap', tmp_path / 'a.mcap')
-    assert np.frombuffer((tmp_path / 'a.mcap').read_bytes(), np.uint8).sum() == before

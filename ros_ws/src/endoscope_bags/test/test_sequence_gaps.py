@@ -29,9 +29,7 @@ def test_every_message_missing_between_first_and_last_is_counted(first, dropped)
 
 
 @given(
-    st.lists(st.booleans(), min_size=40, max_size=40),
-    st.integers(1, 10**6),
-    st.integers(1, 10**6),
+    st.lists(st.booleans(), min_size=40, max_size=40), st.integers(1, 10**6), st.integers(1, 10**6)
 )
 def test_two_publishers_in_any_order_lose_nothing(order, first_a, first_b):
     next_number = {False: first_a, True: first_b}

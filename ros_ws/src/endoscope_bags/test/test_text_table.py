@@ -195,11 +195,3 @@ def test_incomplete_rows_are_counted_and_dropped_where_the_mapping_says_so(tmp_p
         '/endoscope/slave/measured_js': [1.0, 2.0, 3.0],
         '/endoscope/wires/measured_js': [0.0, 3.0],
     }
-
-
-def test_lines_of_text_may_stand_above(tmp_path, mapping):
-    path = tmp_path / 'mapping.yaml'
-    path.write_text(MAPPING + 'header_lines: 2\ndelimiter: whitespace\n')
-    table = tmp_path / 'table.txt'
-    table.write_text('# rig\n# t u q a b\n0 1 1 5 5\n\n1 1 1 5 5\n')
-    assert convert_table(table, load_table_mapping(path), tmp_path / 'bag').rows == 2

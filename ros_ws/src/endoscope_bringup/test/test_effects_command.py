@@ -20,18 +20,6 @@ def test_lists_every_effect(capsys):
     assert [line.split()[0] for line in places.splitlines()[1:]] == list(FUNCTIONS)
 
 
-def test_tells_of_a_place(capsys):
-    assert main(['effects', 'load_of_speed']) == 0
-    told = ' '.join(capsys.readouterr().out.split())
-    assert "f(w), odd, w = the joint's angular speed" in told
-    assert 'w -10 to 10 rad/s where no range is given' in told
-    assert 'f(w) within +-0.1 N m' in told
-    assert main(['effects', '--json', 'load_of_speed', 'gravity']) == 0
-    place, effect = json.loads(capsys.readouterr().out)
-    assert (place['shape'], place['symbol'], place['high']) == ('odd', 'w', 10.0)
-    assert effect['id'] == 'gravity'
-
-
 def test_tells_equation_source_and_parameters(capsys):
     assert main(['effects', 'joint_stop', 'load_cell_gain']) == 0
     told = ' '.join(capsys.readouterr().out.split())
@@ -42,12 +30,6 @@ def test_tells_equation_source_and_parameters(capsys):
     assert (
         'wire 0: the cell of the positive wire, 1: the cell of the negative wire, typical' in told
     )
-
-
-def test_tells_what_counted_parameters_stand_for(capsys):
-    assert main(['effects', 'configuration_change']) == 0
-    told = ' '.join(capsys.readouterr().out.split())
-    assert 'smooth 0: changes evenly, 1: changes smoothly, typical 0' in told
 
 
 def test_an_unknown_effect_is_one_line_and_exit_2(capsys):

@@ -17,38 +17,42 @@ from endoscope_core.physics import JointParameters, PlantDescription, simulate
 from endoscope_core.rig import load_rig
 from endoscope_core.signals import motion_by_name
 
-START = 1_700_000_000_000_000_000
+STAMPS = 1_700_000_000_000_000_000 + np.arange(10_000) * 1_000_000
+
+
+def calibration_of(plant):
+    """Desired angle and the answer of a joint."""
+    angle, _ = motion_by_name('calibration').sample(np.arange(0.0, 10.0, 1e-3))
+    return angle[:, :1], simulate(plant, angle[:, :1] * load_rig().joints.gear)
+
+
+@pytest.fixture(scope='module')
+def calibration():
+    # Friction that grows with the bend is no part of Bouc-Wen's equation.
+    return calibration_of(PlantDescription({'bend_x': JointParameters()}))
+
+
+def write_bag(folder, *streams):
+    """Write streams of a topic, its names, the samples between two of them, and its values."""
+    with BagWriter(folder) as writer:
+        for topic, names, every, values in streams:
+            at = STAMPS[::every]
+            cdr = encode_joint_states(names, at, **{k: v[::every] for k, v in values.items()})
+            writer.write_streams([MessageStream(f'/rig/{topic}', JOINT_STATE, cdr, at + 7, at + 5)])
+    return folder
 
 
 @pytest.fixture(scope='module')
 def bag(tmp_path_factory):
-    """A calibration of the nominal rig, one joint, all that its sensors say."""
-    plant = PlantDescription()
-    angle, _ = motion_by_name('calibration').sample(np.arange(0.0, 9.0, 1e-3))
-    made = simulate(plant, 0.5 * angle)
-    stamps = START + np.arange(len(angle)) * 1_000_000
-    folder = tmp_path_factory.mktemp('calibration') / 'bag'
-    wires = ['wire_x_pos', 'wire_x_neg']
-    streams = [
-        ('motor/servo_jp', ['motor_x'], stamps, {'position': 0.5 * angle[:, :1]}),
-        ('motor/measured_js', ['motor_x'], stamps, {'position': made.shaft_position[:, :1]}),
-        ('wires/measured_js', wires, stamps, {'effort': made.tension[:, 0]}),
-        ('slave/measured_js', ['bend_x'], stamps[::25], {'position': made.bending[::25, :1]}),
-    ]
-    with BagWriter(folder) as writer:
-        writer.write_streams(
-            [
-                MessageStream(
-                    f'/rig/{topic}',
-                    JOINT_STATE,
-                    encode_joint_states(names, at, **values),
-                    at + 7,
-                    at + 5,
-                )
-                for topic, names, at, values in streams
-            ]
-        )
-    return folder
+    """A calibration of the nominal rig, with all that its sensors say."""
+    angle, made = calibration_of(PlantDescription().of_joints(['bend_x']))
+    return write_bag(
+        tmp_path_factory.mktemp('calibration') / 'bag',
+        ('motor/servo_jp', ['motor_x'], 1, {'position': 0.5 * angle}),
+        ('motor/measured_js', ['motor_x'], 1, {'position': made.shaft_position}),
+        ('wires/measured_js', ['wire_x_pos', 'wire_x_neg'], 1, {'effort': made.tension[:, 0]}),
+        ('slave/measured_js', ['bend_x'], 25, {'position': made.bending}),
+    )
 
 
 def test_the_plant_is_identified_from_a_bag(bag, capsys):
@@ -78,57 +82,22 @@ def test_a_table_holds_no_plants(bag, tmp_path, capsys):
     assert '--table' in capsys.readouterr().err
 
 
-@pytest.fixture(scope='module')
-def calibration():
-    """Stamps, desired angle and the answer of a rig whose loop Bouc-Wen's equation can have."""
-    angle, _ = motion_by_name('calibration').sample(np.arange(0.0, 10.0, 1e-3))
-    # Friction that grows with the bend is no part of that.
-    plant = PlantDescription({'bend_x': JointParameters(), 'bend_y': JointParameters()})
-    trajectory = simulate(plant, angle * load_rig().joints.gear)
-    stamps = 1_700_000_000_000_000_000 + np.arange(0, 10_000) * 1_000_000
-    return stamps, angle, trajectory
-
-
-def write_bag(folder, streams):
-    with BagWriter(folder) as writer:
-        writer.write_streams(
-            [
-                MessageStream(
-                    topic,
-                    JOINT_STATE,
-                    encode_joint_states(names, stamps, position=values),
-                    stamps + 7,
-                    stamps + 5,
-                )
-                for topic, names, stamps, values in streams
-            ]
-        )
-    return folder
-
-
 @pytest.mark.parametrize('driver', ['motor/measured_js', 'motor/servo_jp', 'slave/servo_jp'])
 def test_identifying_a_bag_finds_the_width_of_its_loop(calibration, tmp_path, driver, capsys):
-    stamps, angle, trajectory = calibration
-    bending = trajectory.bending[::25, :1]
+    angle, made = calibration
     names = ['bend_x'] if driver.startswith('slave') else ['motor_x']
-    values = {
-        'motor/measured_js': trajectory.shaft_position[:, :1],
-        'motor/servo_jp': 0.5 * angle[:, :1],
-        'slave/servo_jp': angle[:, :1],
-    }[driver]
+    values = {'motor/measured_js': made.shaft_position, 'motor/servo_jp': 0.5 * angle}
     bag = write_bag(
         tmp_path / 'bag',
-        [
-            (f'/rig/{driver}', names, stamps, values),
-            ('/rig/slave/measured_js', ['bend_x'], stamps[::25], bending),
-        ],
+        (driver, names, 1, {'position': values.get(driver, angle)}),
+        ('slave/measured_js', ['bend_x'], 25, {'position': made.bending}),
     )
     assert main(['identify', str(bag), '--model', 'bouc_wen']) == 0
     found = json.loads(capsys.readouterr().out)['joints']
     assert list(found) == ['bend_x']
     model = BoucWenParameters.from_dict(found['bend_x']['model'])
     settled = slice(2717, 9000)
-    width = width_at_mid_height(angle[settled, 0], trajectory.bending[settled, 0])
+    width = width_at_mid_height(angle[settled, 0], made.bending[settled, 0])
     modelled = forward(model, Servo().answer(angle[:, 0], 1e-3))
     assert width_at_mid_height(angle[settled, 0], modelled[settled]) == pytest.approx(
         width, abs=np.deg2rad(2.0)
@@ -137,11 +106,8 @@ def test_identifying_a_bag_finds_the_width_of_its_loop(calibration, tmp_path, dr
 
 
 def test_a_bag_that_does_not_say_what_the_motors_did_is_refused(calibration, tmp_path, capsys):
-    stamps, _, trajectory = calibration
-    bag = write_bag(
-        tmp_path / 'bag',
-        [('/rig/slave/measured_js', ['bend_x'], stamps[::25], trajectory.bending[::25, :1])],
-    )
+    bending = {'position': calibration[1].bending}
+    bag = write_bag(tmp_path / 'bag', ('slave/measured_js', ['bend_x'], 25, bending))
     assert main(['identify', str(bag), '--model', 'bouc_wen']) == 2
     error = capsys.readouterr().err
     assert 'motor/measured_js' in error

@@ -29,10 +29,7 @@ class Hand:
     def turn(self, *keys):
         self.ms += TURN
         self.last = self.handle.turn(
-            self.ms * MS,
-            keys,
-            self.hindrance,
-            self.handle.position if self.follows else None,
+            self.ms * MS, keys, self.hindrance, self.handle.position if self.follows else None
         )
         return self.last
 

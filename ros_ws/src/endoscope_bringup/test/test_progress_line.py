@@ -50,11 +50,3 @@ def test_where_shares_are_said_each_step_is_a_line_once():
             assert '[##########..........] 0 s  judging' in said
         else:
             assert said == 'moving\njudging\n'
-
-
-def test_a_bar_is_full_only_when_all_is_done():
-    terminal = Terminal()
-    with ProgressLine(1, 'reading', terminal) as progress:
-        for name in 'abcd':
-            progress.step(name)
-    assert '#' * 20 not in terminal.getvalue()

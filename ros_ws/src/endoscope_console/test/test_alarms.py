@@ -4,7 +4,7 @@ import pytest
 
 from endoscope_console.alarms import Alarm, Alarms, Level
 from endoscope_console.graph_side import is_calibrated
-from endoscope_console.view import busy, result
+from endoscope_console.view import result
 from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.client.graph_listener import Health
 
@@ -36,21 +36,6 @@ def test_to_have_seen_it_does_not_mend_it():
         alarms.acknowledge('fault')
     assert alarms.update(of(FAULT)) == (FAULT,)
     assert alarms.update({}) == (FAULT,)
-
-
-def test_there_may_be_nothing_to_acknowledge():
-    with pytest.raises(EndoscopeError, match='nothing'):
-        Alarms().acknowledge('fault')
-
-
-def test_a_busy_machine_says_by_how_much_and_what_to_do():
-    close = 'close other pages, viewers and programs'
-    slower = 'or start the console with --rate 10'
-    assert busy(17.4, 2, 0.31, 30) == (
-        f'the machine is too busy (load 17 on 2 cores, simulated at 0.3 of real time): {close}, '
-        f'{slower}'
-    )
-    assert busy(3.0, 1, None, 10) == f'the machine is too busy (load 3 on 1 core): {close}'
 
 
 def test_a_calibration_that_was_aborted_is_none():

@@ -9,10 +9,6 @@ from endoscope_console.pictures import Envelope
 SAMPLES = st.lists(st.floats(-1e6, 1e6) | st.just(math.nan), max_size=5)
 
 
-def test_where_nothing_came_nothing_is_known():
-    assert np.isnan(Envelope(3).close()).all()
-
-
 @given(st.lists(st.tuples(st.integers(0, 2), SAMPLES), max_size=20))
 def test_it_is_smallest_largest_and_last_of_what_came(takes):
     envelope = Envelope(3)

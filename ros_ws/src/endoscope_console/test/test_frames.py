@@ -119,11 +119,3 @@ def test_a_picture_that_was_written_is_read_with_what_is_unknown_in_it(count, se
     np.testing.assert_array_equal(frame.ranges, ranges)
     np.testing.assert_array_equal(frame.wanted, line)
     np.testing.assert_array_equal(frame.actual, unknown)
-
-
-def test_arrays_of_another_shape_are_not_written():
-    line = np.zeros((POINTS, 3))
-    with pytest.raises(ValueError, match='ranges'):
-        encode_telemetry(0, 0.0, 0.0, np.zeros(3), line, line)
-    with pytest.raises(ValueError, match='polyline'):
-        encode_telemetry(0, 0.0, 0.0, np.zeros((1, 3)), line[:-1], line)

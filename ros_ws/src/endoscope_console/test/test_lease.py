@@ -3,49 +3,9 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from endoscope_console.teleop.lease import SILENCE_NS, UNATTENDED_NS, Attendance, Claim, Lease
+from endoscope_console.teleop.lease import SILENCE_NS, UNATTENDED_NS, Attendance, Lease
 
 MS = 1_000_000
-
-
-def test_a_free_lease_is_granted_and_kept_until_it_is_given_back():
-    lease = Lease()
-    assert (lease.holder, lease.since_ns) == ('', 0)
-    assert lease.claim('c1', False, 5) == Claim(True)
-    assert (lease.holder, lease.since_ns) == ('c1', 5)
-    assert lease.claim('c1', False, 9) == Claim(True)
-    assert lease.since_ns == 5
-    lease.release('c2')
-    assert lease.holder == 'c1'
-    lease.release('c1')
-    assert (lease.holder, lease.since_ns) == ('', 0)
-
-
-def test_another_is_refused_by_name_unless_he_takes_it():
-    lease = Lease()
-    lease.claim('c1', False, 0)
-    assert lease.claim('c2', False, 1) == Claim(False, 'c1 is the operator')
-    assert lease.holder == 'c1'
-    assert lease.claim('c2', True, 2) == Claim(True, lost_by='c1')
-    assert (lease.holder, lease.since_ns) == ('c2', 2)
-    lease.release('c1')
-    assert lease.holder == 'c2'
-
-
-@pytest.mark.parametrize('by_claim', [True, False])
-def test_two_seconds_of_silence_end_it_and_say_whose_it_was(by_claim):
-    lease = Lease()
-    lease.claim('c1', False, 0)
-    last = 700 * MS
-    if by_claim:
-        lease.claim('c1', False, last)
-    else:
-        lease.heard('c1', last)
-    lease.heard('c2', last + SILENCE_NS - 1)
-    assert lease.turn(last + SILENCE_NS - 1) == ''
-    assert lease.turn(last + SILENCE_NS) == 'c1'
-    assert lease.holder == ''
-    assert lease.turn(last + 2 * SILENCE_NS) == ''
 
 
 def test_a_sign_that_was_stamped_before_another_does_not_shorten_it():

@@ -16,7 +16,6 @@ from endoscope_console.orders import (
     Mark,
     Set,
     State,
-    in_words,
     read_hello,
     read_order,
 )
@@ -73,10 +72,3 @@ def test_no_text_gets_any_further(text):
         read_order(text)
     with pytest.raises(MalformedOrderError):
         read_hello(text)
-
-
-def test_an_order_in_words():
-    assert in_words(Claim(1)) == 'claim'
-    assert in_words(Claim(1, take=True)) == 'claim take'
-    assert in_words(State(1, 'enable')) == 'state command enable'
-    assert in_words(Set(1, compensator='physical')) == 'set compensator physical'

@@ -68,14 +68,6 @@ def test_in_speed_mode_the_angles_run_by_deflection_and_speed():
     assert hand.beat(100)[0] - x == pytest.approx(-1.0 * 0.1)
 
 
-def test_a_deflection_beyond_the_whole_is_the_whole():
-    hand = Follower()
-    hand.take_hold()
-    start = hand.beat()
-    hand.says(x=1e30, y=-3.0)
-    assert hand.beat(100) == pytest.approx((start[0] + 0.05, start[1] - 0.025))
-
-
 def test_a_negative_speed_turns_the_way_round():
     hand = Follower(speeds=((-0.5, -1.0), (0.25, 2.0)))
     hand.take_hold()

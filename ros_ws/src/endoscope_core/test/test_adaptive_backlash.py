@@ -2,6 +2,7 @@ import math
 
 import numpy as np
 import pytest
+from driven_play import PERIOD, TICK, DrivenPlay
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,71 +18,14 @@ from endoscope_core.control.adaptive_backlash import (
     robust_term,
 )
 
-TICK = 1e-3
-PERIOD = 25
-
-
-class Rig:
-    """A play with gain, behind a first-order servo, seen by a late tracker at 40 Hz."""
-
-    def __init__(self, half_gap, gain=0.9, tracker_delay=20):
-        self.motor = 0.0
-        self.joint = 0.0
-        self.half_gap = half_gap
-        self.gain = gain
-        self.delay = tracker_delay
-        self.past = []
-
-    def advance(self, command):
-        self.motor += (command - self.motor) * TICK / 0.03
-        reach = self.gain * self.motor
-        self.joint = min(max(self.joint, reach - self.half_gap), reach + self.half_gap)
-
-    def measure(self, tick):
-        self.past.append(self.joint)
-        at = tick - self.delay
-        if tick % PERIOD or at < 0:
-            return None
-        return TrackerMeasurement(at * TICK, [self.past[at]])
-
-
-def drive(controller, rig, ticks, first=0, tracker=True, amplitude=1.0):
-    errors, corrections = [], []
-    for k in range(first, first + ticks):
-        angle, speed = amplitude * math.sin(k * TICK), amplitude * math.cos(k * TICK)
-        measurement = rig.measure(k)
-        correction = controller.step(k * TICK, [angle], [speed], measurement if tracker else None)[
-            0
-        ]
-        rig.advance(angle + correction)
-        errors.append(rig.joint - angle)
-        corrections.append(correction)
-    return np.array(errors), np.array(corrections)
-
 
 @pytest.mark.parametrize('half_gap', [0.1, 0.7])
-def test_it_learns_a_backlash_of_unknown_size(half_gap):
-    alone, _ = drive(AdaptiveBacklashController(1), Rig(half_gap), 20000)
-    controller = AdaptiveBacklashController(1)
-    controller.activate()
-    helped, _ = drive(controller, Rig(half_gap), 20000)
+def test_it_learns_a_backlash_of_unknown_size_once_it_is_activated(half_gap):
+    alone, nothing = DrivenPlay(half_gap, 20, active=False).run(20.0, math.sin)
+    assert not nothing.any()
+    helped, _ = DrivenPlay(half_gap, 20).run(20.0, math.sin)
     late = slice(13000, None)
     assert np.std(helped[late]) < 0.25 * np.std(alone[late])
-
-
-def test_it_follows_a_tube_that_changes_shape():
-    controller = AdaptiveBacklashController(1)
-    controller.activate()
-    rig = Rig(0.2)
-    drive(controller, rig, 10000)
-    rig.half_gap = 0.6
-    errors, _ = drive(controller, rig, 20000, first=10000)
-    assert np.std(errors[13000:]) < 0.4 * np.std(errors[:3000])
-
-
-def test_nothing_comes_out_before_it_is_activated():
-    _, corrections = drive(AdaptiveBacklashController(1), Rig(0.4), 3000)
-    assert np.all(corrections == 0.0)
 
 
 def test_late_measurements_are_compared_with_what_was_desired_then():
@@ -135,12 +79,7 @@ def test_an_unusable_measurement_is_counted_and_ignored(measurement):
 
 @pytest.mark.parametrize(
     'inputs',
-    [
-        (0.1, [0.0], [0.0]),
-        (math.nan, [0.0], [0.0]),
-        (0.3, [math.inf], [0.0]),
-        (0.3, [0.0], []),
-    ],
+    [(0.1, [0.0], [0.0]), (math.nan, [0.0], [0.0]), (0.3, [math.inf], [0.0]), (0.3, [0.0], [])],
 )
 def test_bad_input_is_refused(inputs):
     controller = AdaptiveBacklashController(1)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from endoscope_core.control import AdoptionError, adopted_plant, plant_hash
+from endoscope_core.control import AdoptionError, adopted_plant
 from endoscope_core.physics import EffectSpec, PlantDescription
 from endoscope_core.physics.plant_file import plant_as_text
 from endoscope_core.rig import load_rig
@@ -27,13 +27,6 @@ def with_play():
         RIG,
         JOINTS,
     )
-
-
-def refused(text, rig=RIG):
-    with pytest.raises(AdoptionError) as error:
-        adopted_plant(text, rig, JOINTS)
-    assert '\n' not in str(error.value)
-    return error.value.code
 
 
 def test_the_inverse_has_what_stands_between_motor_and_tip(with_play):
@@ -64,22 +57,22 @@ def test_the_range_is_within_the_reach_of_the_rig(with_play):
     assert with_play.outside((0.0, 1.01 * ends[1, 1])) == 1
 
 
-def test_it_is_known_by_its_text(with_play):
-    assert with_play.hash == plant_hash(with_play.text) != plant_hash(with_play.text + ' ')
+WEAK = EffectSpec('torque_limit', 'bend_x', {'limit_nm': 0.001})
 
 
-NO_PLANTS = ('', 'joints: [', 'joints: {bend_x: {stiff: 1}}', 'x' * 100_001)
-
-
-@pytest.mark.parametrize('text', NO_PLANTS)
-def test_what_is_no_plant_is_refused(text):
-    assert refused(text) == AdoptionCode.NOT_A_PLANT
-
-
-def test_a_plant_of_other_joints_is_refused():
-    assert refused('joints: {bend_x: {}}') == AdoptionCode.OTHER_JOINTS
-
-
-def test_a_plant_whose_inverse_gains_nothing_is_refused():
-    weak = EffectSpec('torque_limit', 'bend_x', {'limit_nm': 0.001})
-    assert refused(text_with(weak)) == AdoptionCode.NOT_INVERTIBLE
+@pytest.mark.parametrize(
+    ('text', 'code'),
+    [
+        ('', AdoptionCode.NOT_A_PLANT),
+        ('joints: [', AdoptionCode.NOT_A_PLANT),
+        ('joints: {bend_x: {stiff: 1}}', AdoptionCode.NOT_A_PLANT),
+        ('x' * 100_001, AdoptionCode.NOT_A_PLANT),
+        ('joints: {bend_x: {}}', AdoptionCode.OTHER_JOINTS),
+        (text_with(WEAK), AdoptionCode.NOT_INVERTIBLE),
+    ],
+)
+def test_what_cannot_be_inverted_is_refused_in_one_line(text, code):
+    with pytest.raises(AdoptionError) as error:
+        adopted_plant(text, RIG, JOINTS)
+    assert error.value.code == code
+    assert '\n' not in str(error.value)

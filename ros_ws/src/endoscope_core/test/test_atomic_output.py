@@ -14,9 +14,7 @@ from endoscope_core.atomic_output import (
 from endoscope_core.errors import OutputError
 
 
-def test_what_is_written_has_the_name_that_a_person_will_find(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_written_has_the_name_that_a_person_will_find(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with atomic_directory(tmp_path / 'demo') as partial:
         told = with_final_names(f'recording to {partial / "bag"}')
@@ -26,7 +24,7 @@ def test_what_is_written_has_the_name_that_a_person_will_find(
         partial.touch()
 
 
-def test_file_takes_its_name_only_when_the_block_ends(tmp_path: Path) -> None:
+def test_file_takes_its_name_only_when_the_block_ends(tmp_path):
     target = tmp_path / 'made' / 'report.json'
     with atomic_file(target) as partial:
         partial.write_text('whole')
@@ -37,9 +35,7 @@ def test_file_takes_its_name_only_when_the_block_ends(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('error', [RuntimeError, KeyboardInterrupt, SystemExit])
-def test_failed_block_keeps_the_old_file_and_leaves_nothing(
-    tmp_path: Path, error: type[BaseException]
-) -> None:
+def test_failed_block_keeps_the_old_file_and_leaves_nothing(tmp_path, error):
     target = tmp_path / 'plant.yaml'
     target.write_text('old')
     with pytest.raises(error), atomic_file(target) as partial:
@@ -49,28 +45,20 @@ def test_failed_block_keeps_the_old_file_and_leaves_nothing(
     assert list(tmp_path.iterdir()) == [target]
 
 
-def test_file_is_not_overwritten_when_that_is_refused(tmp_path: Path) -> None:
+def test_file_is_not_overwritten_when_that_is_refused(tmp_path):
     target = tmp_path / 'a.txt'
     write_text(target, 'old')
     with pytest.raises(OutputError, match=r'a\.txt exists already'):
         write_text(target, 'new', overwrite=False)
     assert target.read_bytes() == b'old'
-    write_text(target, 'new')
-    assert target.read_bytes() == b'new'
-
-
-def test_folder_in_place_of_a_file_is_refused(tmp_path: Path) -> None:
+    write_text(target, 'τ')
+    assert target.read_bytes() == 'τ'.encode()
     with pytest.raises(OutputError, match='is a folder'):
         write_text(tmp_path, 'text')
 
 
-def test_text_is_written_as_utf8(tmp_path: Path) -> None:
-    write_text(tmp_path / 'a.html', 'τ = µ θ')
-    assert (tmp_path / 'a.html').read_bytes().decode('utf-8') == 'τ = µ θ'
-
-
 @pytest.mark.parametrize('exists', [False, True])
-def test_directory_appears_whole(tmp_path: Path, exists: bool) -> None:
+def test_directory_appears_whole(tmp_path, exists):
     target = tmp_path / 'bag'
     if exists:
         target.mkdir()
@@ -81,14 +69,14 @@ def test_directory_appears_whole(tmp_path: Path, exists: bool) -> None:
     assert list(tmp_path.iterdir()) == [target]
 
 
-def test_failed_directory_leaves_nothing(tmp_path: Path) -> None:
+def test_failed_directory_leaves_nothing(tmp_path):
     with pytest.raises(RuntimeError), atomic_directory(tmp_path / 'bag') as partial:
         (partial / 'half').write_text('x')
         raise RuntimeError
     assert list(tmp_path.iterdir()) == []
 
 
-def test_taken_folder_is_refused_and_kept(tmp_path: Path) -> None:
+def test_taken_folder_is_refused_and_kept(tmp_path):
     (tmp_path / 'kept').write_text('x')
     with pytest.raises(OutputError, match='is not empty'), atomic_directory(tmp_path):
         pytest.fail('the block must not run')
@@ -97,7 +85,7 @@ def test_taken_folder_is_refused_and_kept(tmp_path: Path) -> None:
     assert (tmp_path / 'kept').read_text() == 'x'
 
 
-def test_a_folder_that_nothing_can_be_made_in_is_refused_beforehand(tmp_path: Path) -> None:
+def test_a_folder_that_nothing_can_be_made_in_is_refused_beforehand(tmp_path):
     (tmp_path / 'file').touch()
     for place in (tmp_path / 'file' / 'out', Path('/proc/out')):
         with pytest.raises(OutputError, match=f'{place} cannot be created'):

@@ -23,26 +23,12 @@ moves = st.floats(-1e6, 1e6) | st.floats(-1.0, 1.0) | st.floats(-1e-9, 1e-9)
 
 
 @given(parameter_sets, st.floats(-1.0, 1.0), st.lists(moves, min_size=1, max_size=30))
-def test_state_stays_within_its_bound_for_steps_of_any_size(parameters, start, steps):
+def test_state_moves_with_its_driver_and_stays_within_its_bound(parameters, start, steps):
     y = start
     for step in steps:
-        y = parameters.memory_step(y, step)
+        before, y = y, parameters.memory_step(y, step)
         assert abs(y) <= 1.0 + 1e-12
-
-
-@given(parameter_sets, st.floats(-1.0, 1.0), moves)
-def test_state_moves_with_its_driver(parameters, start, step):
-    change = parameters.memory_step(start, step) - start
-    assert change * step >= -1e-15
-
-
-@given(st.floats(-0.95, 1.0), st.floats(-1.0, 1.0), st.floats(-3.0, 3.0), st.floats(0.0, 1.0))
-def test_with_n_one_a_step_is_exact_so_it_may_be_cut_anywhere(rho, start, step, cut):
-    parameters = BoucWenParameters.from_shape(1.0, 0.5, 0.5, rho, 1.0)
-    whole = parameters.memory_step(start, step)
-    first = parameters.memory_step(start, cut * step)
-    parts = parameters.memory_step(first, step - cut * step)
-    assert parts == pytest.approx(whole, abs=1e-12)
+        assert (y - before) * step >= -1e-15
 
 
 @pytest.mark.parametrize('n', [1.0, 1.3, 2.0, 3.7])
@@ -81,15 +67,6 @@ def test_saturated_loop_is_as_wide_as_the_lag_says():
     lagging = forward(SAFE, theta) - SAFE.alpha * theta
     assert np.max(lagging) == pytest.approx(SAFE.lag, rel=1e-3)
     assert np.min(lagging) == pytest.approx(-SAFE.lag, rel=1e-3)
-
-
-@given(parameter_sets)
-def test_shape_comes_back(parameters):
-    again = BoucWenParameters.from_shape(
-        parameters.alpha, parameters.lag, parameters.travel, parameters.rho, parameters.n
-    )
-    assert again.to_dict() == pytest.approx(parameters.to_dict(), rel=1e-6, abs=1e-9)
-    assert BoucWenParameters.from_dict(parameters.to_dict()) == parameters
 
 
 @pytest.mark.parametrize(

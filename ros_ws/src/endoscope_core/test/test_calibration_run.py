@@ -2,12 +2,7 @@ import numpy as np
 import pytest
 
 from endoscope_core.calibration import BendingRecord, CalibrationRun, CalibrationStep
-from endoscope_core.signals import (
-    BRIEF,
-    CALIBRATION_SAMPLES,
-    calibration_motion,
-    calibration_sinusoid,
-)
+from endoscope_core.signals import BRIEF, calibration_motion, calibration_sinusoid
 
 MS = 1_000_000
 
@@ -42,25 +37,8 @@ def test_returns_rests_and_moves_without_a_jump():
     np.testing.assert_allclose(np.gradient(table[:, 1], 1e-3)[5:-5], table[5:-5, 3], atol=0.05)
 
 
-def test_the_record_begins_with_the_sinusoid():
-    run = CalibrationRun((0.1, 0.0), 4, MS, 1.0, 0.5)
-    table, steps = commands_of(run)
-    first = steps.index(CalibrationStep.MOVING)
-    assert run.record.start_ns == round(table[first, 0] * 1e9)
-    time = np.arange(CALIBRATION_SAMPLES) * 1e-3
-    np.testing.assert_allclose(
-        table[first : first + CALIBRATION_SAMPLES, 1], calibration_sinusoid()(time)[0], atol=1e-12
-    )
-
-
-def test_missed_ticks_do_not_stretch_the_motion():
-    run = CalibrationRun((0.0, 0.0), 4, MS, 1.0, 0.0)
-    table, _ = commands_of(run, periods=3)
-    assert abs(table[-1, 0] - table[0, 0] - 10.2) < 0.01
-
-
-@pytest.mark.parametrize('periods', [4, 5, 10, 20])
-def test_a_slower_beat_commands_the_same_motion_to_its_very_end(periods):
+@pytest.mark.parametrize('periods', [1, 3, 4, 5, 10, 20])
+def test_any_beat_commands_the_sinusoid_to_its_very_end(periods):
     run = CalibrationRun((0.4, -1.0), 4, MS, 1.0, 0.5)
     table, steps = commands_of(run, periods)
     moving = steps.index(CalibrationStep.MOVING)

@@ -5,7 +5,7 @@ from endoscope_core.hysteresis.inverse import MODELS
 from endoscope_core.signals import MOTIONS, calibration_motion
 
 
-def test_every_name_leads_to_what_it_names() -> None:
+def test_every_name_leads_to_what_it_names():
     assert tuple(MODELS) == choices.HYSTERESIS_MODELS
     assert tuple(MOTIONS) == choices.PLAYED_MOTIONS
     for name in choices.CALIBRATION_MOTIONS:

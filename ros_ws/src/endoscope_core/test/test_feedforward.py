@@ -39,12 +39,6 @@ def run(feedforward, start, end):
     )
 
 
-def test_without_a_model_the_desired_angle_passes():
-    commands = run(Feedforward(2, SETTINGS), 0.0, 0.5)
-    expected = [desired_at(t) for t in np.arange(0.0, 0.5, TICK)]
-    np.testing.assert_allclose(commands, expected, atol=1e-12)
-
-
 def test_without_lead_it_is_equation_5():
     feedforward = Feedforward(
         1, FeedforwardSettings(LIMITS, lead=0.0, speed_limit=1e3, dead_band=0.0)

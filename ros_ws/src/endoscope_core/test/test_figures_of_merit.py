@@ -18,24 +18,11 @@ def test_width_of_a_play_is_its_gap(half_gap, amplitude):
     assert width == pytest.approx(2.0 * half_gap, abs=2e-5)
 
 
-@given(st.floats(-0.7, 0.7))
-def test_width_of_an_ellipse_follows_from_its_phase(lag):
-    time = np.linspace(0.0, 2.0 * np.pi, 3001)
-    width = width_at_mid_height(np.sin(time), np.sin(time - lag))
-    assert width == pytest.approx(2.0 * np.sin(lag), abs=1e-5)
-
-
 def test_width_stands_noise_that_crosses_the_middle_many_times():
     desired = 1.5 * np.sin(TIME)
     noise = np.random.default_rng(3).normal(0.0, 0.005, TIME.size)
     actual = play(desired, 0.4) + noise
     assert width_at_mid_height(desired[SETTLED], actual[SETTLED]) == pytest.approx(0.8, abs=0.01)
-
-
-def test_width_stands_quantised_angles_that_sit_on_the_middle():
-    desired = 1.5 * np.sin(TIME)
-    actual = np.round(play(desired, 0.4) / 0.05) * 0.05
-    assert width_at_mid_height(desired[SETTLED], actual[SETTLED]) == pytest.approx(0.8, abs=0.06)
 
 
 @pytest.mark.parametrize(
@@ -58,11 +45,7 @@ def test_rmse():
 
 @pytest.mark.parametrize(
     ('desired', 'actual', 'complaint'),
-    [
-        ([0.0], [0.0, 1.0], 'must be equal'),
-        ([], [], 'no samples'),
-        ([0.0], [np.inf], 'not finite'),
-    ],
+    [([0.0], [0.0, 1.0], 'must be equal'), ([], [], 'no samples'), ([0.0], [np.inf], 'not finite')],
 )
 def test_rmse_refuses(desired, actual, complaint):
     with pytest.raises(ValueError, match=complaint):

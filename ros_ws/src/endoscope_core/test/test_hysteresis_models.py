@@ -17,10 +17,6 @@ MOTION = 0.9 * np.sin(TIME) + 0.5 * np.sin(1.73 * TIME)
 steps = st.floats(-1e6, 1e6) | st.floats(-1.0, 1.0) | st.floats(-1e-9, 1e-9)
 
 
-def test_every_model_has_a_set_here():
-    assert set(SAFE) == set(MODELS)
-
-
 @given(st.floats(-1.0, 1.0), st.lists(steps, max_size=30), st.floats(0.01, 1.0), st.floats(0.5, 4))
 def test_dahl_stays_in_bounds_and_goes_with_its_driver(y, moves, travel, exponent):
     for move in moves:
@@ -30,16 +26,9 @@ def test_dahl_stays_in_bounds_and_goes_with_its_driver(y, moves, travel, exponen
         y = after
 
 
-@given(st.floats(-1.0, 1.0), st.floats(-2.0, 2.0), st.floats(0.0, 1.0), st.floats(0.5, 4.0))
-def test_dahl_is_exact_so_a_step_may_be_cut_anywhere(y, move, cut, exponent):
-    whole = dahl_step(y, move, 0.4, exponent)
-    parts = dahl_step(dahl_step(y, cut * move, 0.4, exponent), move - cut * move, 0.4, exponent)
-    assert parts == pytest.approx(whole, abs=1e-9)
-
-
 @pytest.mark.parametrize('exponent', [0.6, 1.0, 1.7, 3.0])
 def test_dahl_solves_its_equation(exponent):
-    path, y = np.linspace(0.0, 0.9, 300), -0.7
+    path, y = np.array([0.0, 1e-3, 0.3, 0.31, 0.9]), -0.7
     found = [y]
     for step in np.diff(path):
         found.append(dahl_step(found[-1], step, 0.5, exponent))
@@ -54,7 +43,7 @@ def test_dahl_solves_its_equation(exponent):
     np.testing.assert_allclose(found, truth, atol=1e-6)
 
 
-@pytest.mark.parametrize('name', SAFE)
+@pytest.mark.parametrize('name', MODELS)
 @given(st.lists(st.floats(-1.7, 1.7), min_size=2, max_size=30))
 @settings(max_examples=20)
 def test_inverses_keep_to_the_slope_that_they_state(name, points):
@@ -73,7 +62,7 @@ def test_inverses_keep_to_the_slope_that_they_state(name, points):
         assert -1.0 - 1e-9 <= inverse.direction <= 1.0 + 1e-9
 
 
-@pytest.mark.parametrize('name', SAFE)
+@pytest.mark.parametrize('name', MODELS)
 def test_steps_of_the_inverse_are_those_of_the_whole_series(name):
     inverse, commands = DirectInverse(SAFE[name], 0.0, MOTION[0]), []
     for angle in MOTION:
@@ -82,7 +71,7 @@ def test_steps_of_the_inverse_are_those_of_the_whole_series(name):
     np.testing.assert_allclose(commands, direct_inverse(SAFE[name], MOTION), atol=1e-12)
 
 
-@pytest.mark.parametrize('name', SAFE)
+@pytest.mark.parametrize('name', MODELS)
 def test_parameters_survive_a_file_and_nothing_else_is_taken(name):
     values = SAFE[name].to_dict()
     assert MODELS[name].from_dict(values) == SAFE[name]

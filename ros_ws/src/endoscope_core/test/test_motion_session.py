@@ -115,27 +115,6 @@ def test_a_heartbeat_that_may_be_somebody_elses_ends_it():
     assert session.hear('session-10', 60 * MS)
 
 
-def test_every_enable_names_a_session_that_never_was():
-    machine, names = OperatingStateMachine(), []
-    for _ in range(3):
-        machine.command('enable', 7_000 * MS)
-        names.append(machine.session)
-        machine.command('disable', 7_000 * MS)
-        assert machine.session == ''
-    later = OperatingStateMachine()
-    later.command('enable', 7_010 * MS)
-    assert [*names, later.session] == [f'session-{n}' for n in (7000, 7001, 7002, 7010)]
-
-
-def test_enabling_again_keeps_the_session_and_a_fault_ends_it():
-    machine = OperatingStateMachine()
-    machine.command('enable', 1_000 * MS)
-    machine.command('enable', 2_000 * MS)
-    assert machine.session == 'session-1000'
-    machine.report_cause('heat', 'too hot')
-    assert machine.session == ''
-
-
 def test_shafts_start_where_they_are_and_stop_where_they_are():
     motion = moving_from((0.4, -0.2))
     assert motion.turn(2 * MS, 1e-3) == (0.4, -0.2)
@@ -162,19 +141,6 @@ def test_a_stream_that_ends_in_motion_leads_no_further_than_it_came():
             assert motion.goal[0] <= last
     assert motion.holding
     assert motion.goal[0] < 0.36
-
-
-def test_what_was_refused_as_too_fast_is_not_made_up_for():
-    motion = moving_from((0.0, 0.0))
-    asked = [0.0] * 10 + [0.015 * k for k in range(50)] + [0.735] * 300
-    refused = 0
-    for t, angle in enumerate(asked, start=2):
-        before = motion.turn(t * MS, 1e-3)
-        refused += motion.command('session-1', t * MS, (angle, 0.0), (), t * MS) is not None
-        motion.session.hear('session-1', t * MS)
-        assert abs(motion.goal[0] - before[0]) <= SPEED * 1e-3 + 1e-9
-    assert refused > 20
-    assert motion.goal[0] == pytest.approx(0.735)
 
 
 class AnyInterleaving(RuleBasedStateMachine):

@@ -91,3 +91,24 @@ def test_first_cause_is_kept():
     assert not machine.report_cause('b', 'second')
     assert machine.cause == 'first'
     assert set(machine.present_causes) == {'a', 'b'}
+
+
+def test_every_enable_names_a_session_that_never_was():
+    machine, names = OperatingStateMachine(), []
+    for _ in range(3):
+        machine.command('enable', 7_000_000_000)
+        names.append(machine.session)
+        machine.command('disable', 7_000_000_000)
+        assert machine.session == ''
+    later = OperatingStateMachine()
+    later.command('enable', 7_010_000_000)
+    assert [*names, later.session] == [f'session-{n}' for n in (7000, 7001, 7002, 7010)]
+
+
+def test_enabling_again_keeps_the_session_and_a_fault_ends_it():
+    machine = OperatingStateMachine()
+    machine.command('enable', 1_000_000_000)
+    machine.command('enable', 2_000_000_000)
+    assert machine.session == 'session-1000'
+    machine.report_cause('heat', 'too hot')
+    assert machine.session == ''

@@ -116,25 +116,6 @@ def test_whatever_is_desired_the_command_is_finite_and_its_speed_and_travel_are_
         last = command
 
 
-def test_modes_change_while_it_moves_without_a_jump():
-    feedforward = Feedforward(1, FeedforwardSettings(LIMITS))
-    physical = FeedforwardLaw('physical', (PARAMETERS,))
-    learning = FeedforwardLaw('adaptive_physical', (PARAMETERS,))
-    given_out = []
-    for k in range(6000):
-        for when, law in ((1000, physical), (2500, learning), (4000, FeedforwardLaw())):
-            if k == when:
-                feedforward.select(law)
-        time = k * TICK
-        given_out.append(feedforward.step([np.sin(time)], [np.cos(time)], TICK)[0])
-        if k % 25 == 0:
-            feedforward.measure(0.0, [0.8 * np.sin(time)])
-    steps = np.abs(np.diff(given_out))
-    for when in (1000, 2500, 4000):
-        # The law's own motion, and once what overcomes the joint's damping.
-        assert np.max(steps[when - 3 : when + 3]) < 0.006
-
-
 def test_limits_out_of_range_are_refused():
     with pytest.raises(ValueError, match='tension'):
         MotorLimits(gear=0.5, travel=1.5, speed=4.8, tension=0.0)

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from physics_rig import ACTING, NOMINAL, hand, run
+from physics_rig import ACTING, hand, run
 
 from endoscope_core import physics
 from endoscope_core.physics import layout as L
-from endoscope_core.physics.effect import Parameter, Stage, Symptom
+from endoscope_core.physics.effect import Symptom
 from endoscope_core.physics.effects import CATALOGUE, showing
 from endoscope_core.physics.hooks import LINKS, ON_SAMPLES
 
@@ -130,13 +130,6 @@ def test_an_effect_acts_on_the_rig_or_on_its_samples():
     assert set(ON_SAMPLES) == {'clock_skew', 'recording_gap', 'tracker_outliers'}
 
 
-def test_the_catalogue_is_in_the_order_of_the_chain():
-    stages = list(Stage)
-    order = [(stages.index(e.stage), e.order) for e in CATALOGUE.values()]
-    assert order == sorted(order)
-    assert len(set(order)) == len(order)
-
-
 def test_no_effect_is_named_outside_its_own_folder():
     ids = re.compile(r'\b(' + '|'.join(CATALOGUE) + r')\b')
     for path in Path(physics.__path__[0]).glob('*.py'):
@@ -149,20 +142,6 @@ def test_no_effect_is_named_outside_its_own_folder():
         assert not {name for pair in found for name in pair} & set(CATALOGUE), path.name
 
 
-def test_nominal_keys_are_those_of_the_rig():
-    assert set(NOMINAL) == set(L.NOMINAL_KEYS)
-
-
 @pytest.mark.parametrize('symptom', Symptom)
 def test_a_symptom_is_of_one_effect(symptom):
     assert [e for e in CATALOGUE.values() if e.traits.symptom is symptom] == [showing(symptom)]
-
-
-def test_what_chooses_a_form_has_words_for_each_choice():
-    with pytest.raises(ValueError, match='wire: give a word for each of its values'):
-        Parameter('wire', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0), words=('first',))
-    wire = Parameter('wire', '-', 0.0, 1.0, 0.0, choices=(0.0, 1.0), words=('first', 'second'))
-    smooth = Parameter('smooth', '-', 2.0, 3.0, 2.0, counted=True, words=('even', 'smooth'))
-    gain = Parameter('gain', '-', 0.5, 2.0, 1.0)
-    assert [p.is_switch for p in (wire, smooth, gain)] == [True, True, False]
-    assert (wire.said(1.0), smooth.said(3.0)) == ('second', 'smooth')

@@ -6,20 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from endoscope_core.physics import (
-    EffectSpec,
-    JointParameters,
-    PlantDescription,
-    TermSpec,
-    simulate,
-)
-from endoscope_core.physics.effects import CATALOGUE
+from endoscope_core.physics import EffectSpec, JointParameters, PlantDescription, TermSpec, simulate
 from endoscope_core.physics.folds import folded
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.evaluation import function_at
 from endoscope_core.physics.functions.places import NODES, VALUES, Shape
 from endoscope_core.physics.functions.term import tabulated
-from endoscope_core.physics.hooks import HOOKS, LOAD
+from endoscope_core.physics.hooks import LOAD
 from endoscope_core.physics.packing import pack, rest_state
 
 TICK = 1e-3
@@ -94,12 +87,6 @@ def zero(place_id):
 @pytest.mark.parametrize('place_id', FUNCTIONS)
 def test_a_function_that_is_zero_is_the_nominal_plant_to_the_last_bit(place_id, nominal):
     np.testing.assert_array_equal(readings(zero(place_id)), nominal)
-
-
-def test_all_of_them_at_zero_change_nothing_where_a_rig_starts_bent():
-    start = (0.4, 0.2)
-    together = readings(*map(zero, FUNCTIONS), start=start)
-    np.testing.assert_array_equal(together, readings(start=start))
 
 
 @pytest.mark.parametrize('place_id', FUNCTIONS)
@@ -315,16 +302,3 @@ def test_a_table_says_what_it_loses():
     smooth = tabulated(TermSpec('bend_x', 'load_of_angle', '0.01 * sin(q)', range=(-1, 1)))
     assert smooth.largest_error < 1e-4 < 2e-3 < kink.largest_error < 0.02
     assert kink.rms_error < kink.largest_error
-
-
-def test_places_name_their_hooks_and_are_no_effects():
-    assert not set(FUNCTIONS) & set(CATALOGUE)
-    assert {place.hook for place in FUNCTIONS.values()} <= set(HOOKS)
-    flags = [each.flag for each in (*FUNCTIONS.values(), *CATALOGUE.values())]
-    assert len(set(flags)) == len(flags)
-
-
-def test_effects_name_families_that_there_are_of_their_own_stage():
-    for effect in CATALOGUE.values():
-        for place_id in effect.traits.families:
-            assert FUNCTIONS[place_id].stage is effect.stage, f'{effect.id}: {place_id}'

@@ -25,13 +25,6 @@ def test_tracker_bias_and_drift_add_up(nominal):
     np.testing.assert_array_equal(done.joint, nominal.joint)
 
 
-@pytest.mark.parametrize('ticks', [40, 12.5])
-def test_tracker_delay_delays_by_its_time(nominal, ticks):
-    late = run(COMMAND, {'tracker_delay': {'delay_s': ticks * TICK}})
-    now = np.arange(3000.0)
-    np.testing.assert_allclose(late.bending, np.interp(now - ticks, now, nominal.joint), atol=1e-12)
-
-
 def test_metal_distorts_what_is_late(nominal):
     bend = {'linear': 0.1, 'quadratic': 0.2, 'cubic': -0.3, 'wave_rad': 0.05, 'wave_phase': 0.5}
     given = {'tracker_distortion': bend | {'wave_number': 6.0}, 'tracker_delay': {'delay_s': 0.03}}
@@ -71,12 +64,14 @@ def test_a_cell_clips_last(nominal):
 
 
 @pytest.mark.parametrize('ticks', [40, 12.5])
-def test_load_cell_delay_delays_both_cells_by_its_time(nominal, ticks):
-    late = run(COMMAND, {'load_cell_delay': {'delay_s': ticks * TICK}})
+@pytest.mark.parametrize('effect_id', ['tracker_delay', 'load_cell_delay'])
+def test_a_delay_is_of_its_time_and_of_its_sensor_alone(nominal, effect_id, ticks):
+    late = run(COMMAND, {effect_id: {'delay_s': ticks * TICK}})
     now = np.arange(3000.0)
-    np.testing.assert_allclose(late.a, np.interp(now - ticks, now, nominal.a), atol=1e-12)
-    np.testing.assert_allclose(late.b, np.interp(now - ticks, now, nominal.b), atol=1e-12)
-    np.testing.assert_array_equal(late.bending, nominal.bending)
+    for read in ('a', 'b', 'bending'):
+        by = ticks if (read == 'bending') == (effect_id == 'tracker_delay') else 0.0
+        expected = np.interp(now - by, now, getattr(nominal, read))
+        np.testing.assert_allclose(getattr(late, read), expected, atol=1e-12)
 
 
 def test_load_cell_lag_is_a_low_pass_of_first_order(nominal):

@@ -26,11 +26,6 @@ def test_a_command_is_in_force_until_the_next_one():
     np.testing.assert_allclose(held[:, 0], [0.5, 2.0, 3.0, 3.0])
 
 
-def test_slow_commands_between_stamps_are_held_not_interpolated():
-    held = hold_on_ticks(np.array([0.0, 0.01]), np.array([[1.0], [2.0]]), 20)
-    np.testing.assert_array_equal(held[:, 0], [1.0] * 10 + [2.0] * 10)
-
-
 def test_answers_between_ticks_lie_between_the_neighbouring_ticks():
     stamps = START_NS + np.arange(300) * 1_000_000
     command = np.column_stack([np.linspace(0, 0.3, 300), np.zeros(300)])

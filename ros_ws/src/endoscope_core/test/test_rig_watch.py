@@ -79,16 +79,6 @@ def test_a_cell_that_reads_too_much_is_told_with_its_part_and_time():
     assert alarm.margin > 1.0
 
 
-def test_a_tube_that_is_bent_more_is_friction_of_the_sheath():
-    time, setpoint = hand(3)
-    bent = rig(configuration_change={'time_s': CHANGED_AT, 'factor': 1.6})
-    watch = RigWatch(described())
-    tell(watch, time, setpoint, read(bent, setpoint))
-    (alarm,) = watch.alarms
-    assert CHANGED_AT < alarm.at < CHANGED_AT + 10.0
-    assert alarm.parts[0] is Part.SHEATH
-
-
 def test_samples_may_come_in_any_portions():
     time, setpoint = hand(3, 12)
     seen = read(rig(), setpoint)

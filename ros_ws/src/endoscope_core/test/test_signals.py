@@ -83,6 +83,7 @@ def test_papers_signals_have_their_form_while_steady():
     np.testing.assert_allclose(non_periodic_signal()(time)[0], expected, atol=1e-12)
 
 
+<<<<<<< HEAD
 def test_commissioning_moves_one_joint_alone_first():
     motion = motion_by_name('commissioning')
     angle, _ = motion.sample(np.arange(0.0, 0.4 * motion.duration, 0.01))
@@ -118,3 +119,16 @@ def test_a_signal_without_steady_part_is_refused():
 def test_an_unknown_motion_names_the_nearest():
     with pytest.raises(ValueError, match="nearest is 'periodic'"):
         motion_by_name('periodik')
+=======
+@pytest.mark.parametrize(
+    ('make', 'complaint'),
+    [
+        (lambda: sequence('jumpy', [move(0.0, 1.0, 1.0), hold(1.0)]), 'jumpy: hold begins'),
+        (lambda: sum_of_sines('brief', [(1.0, 1.0)], 2.0), 'too short'),
+        (lambda: motion_by_name('periodik'), "nearest is 'periodic'"),
+    ],
+)
+def test_what_is_no_motion_is_refused(make, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        make()
+>>>>>>> def2ebb3f89927dce3ac9eec15e5b5b2a0a0285b

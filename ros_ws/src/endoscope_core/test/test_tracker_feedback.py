@@ -4,50 +4,15 @@ import math
 
 import numpy as np
 import pytest
+from driven_play import PERIOD, TICK, DrivenPlay
 
-from endoscope_core.control import (
-    AdaptiveBacklashController,
-    TrackerMeasurement,
-)
 from endoscope_core.control.limits import SHARE_OF_TRAVEL
-
-TICK = 1e-3
-PERIOD = 25
-
-
-class Drive:
-    """A controller on a play with gain behind a servo, driven tick by tick."""
-
-    def __init__(self, half_gap=0.4):
-        self.controller = AdaptiveBacklashController(1)
-        self.controller.activate()
-        self.half_gap = half_gap
-        self.motor = self.joint = 0.0
-        self.tick = 0
-
-    def run(self, seconds, angle_at, tracker=True):
-        """Desired angles and corrections (N,)."""
-        desired, corrections = [], []
-        for _ in range(round(seconds / TICK)):
-            time = self.tick * TICK
-            angle = angle_at(time)
-            speed = (angle_at(time + TICK) - angle) / TICK
-            heard = tracker and self.tick % PERIOD == 0
-            measurement = TrackerMeasurement(time, [self.joint]) if heard else None
-            correction = self.controller.step(time, [angle], [speed], measurement)[0]
-            self.motor += (angle + correction - self.motor) * TICK / 0.03
-            reach = 0.9 * self.motor
-            self.joint = min(max(self.joint, reach - self.half_gap), reach + self.half_gap)
-            desired.append(angle)
-            corrections.append(correction)
-            self.tick += 1
-        return np.array(desired), np.array(corrections)
 
 
 @pytest.fixture
 def at_rest():
     """A controller that has learnt and now rests; what it corrects."""
-    drive = Drive()
+    drive = DrivenPlay()
     drive.run(10.0, math.sin)
     stop = 10.0
     _, corrections = drive.run(1.0, lambda _: math.sin(stop))
@@ -73,11 +38,7 @@ def test_at_rest_it_stays_when_measurements_return_or_say_something_else(at_rest
 
 def test_at_rest_it_stays_when_it_is_switched_off_and_on_and_forgets(at_rest):
     drive, angle, before = at_rest
-    for change in (
-        drive.controller.deactivate,
-        drive.controller.forget,
-        drive.controller.activate,
-    ):
+    for change in (drive.controller.deactivate, drive.controller.forget, drive.controller.activate):
         change()
         _, corrections = drive.run(1.0, lambda _: angle)
         assert np.all(corrections == before)
@@ -85,31 +46,27 @@ def test_at_rest_it_stays_when_it_is_switched_off_and_on_and_forgets(at_rest):
 
 
 def test_a_tracker_that_was_gone_moves_the_correction_no_faster_than_stated():
-    drive = Drive()
+    drive = DrivenPlay()
     drive.run(10.0, math.sin)
     learnt = drive.controller.learnt
-    start = math.sin(10.0)
-
     # One way only, so that the law itself has no reason to turn.
-    way = -1.0 if math.cos(10.0) < 0.0 else 1.0
+    way = math.copysign(0.25, math.cos(10.0))
 
     def on(time):
-        return start + way * 0.25 * (time - 10.0)
+        return math.sin(10.0) + way * (time - 10.0)
 
     _, gone = drive.run(1.5, on, tracker=False)
     assert drive.controller.learnt == learnt
     assert drive.controller.weight < 1.0
     _, back = drive.run(1.5, on)
-    corrections = np.concatenate([gone, back])
-    step = np.abs(np.diff(corrections))
+    step = np.abs(np.diff(np.concatenate([gone, back])))
     gain = max(abs(g) for g, _ in (*learnt, *drive.controller.learnt))
-    own = (gain + 2.0 * SHARE_OF_TRAVEL) * 0.25 * TICK
     # The direction's memory may still be turning within the first few degrees.
-    assert np.max(step[400:]) <= own
+    assert np.max(step[400:]) <= (gain + 2.0 * SHARE_OF_TRAVEL) * 0.25 * TICK
 
 
 def test_the_first_measurement_after_a_gap_teaches_nothing():
-    drive = Drive()
+    drive = DrivenPlay()
     drive.run(10.0, math.sin)
     drive.run(1.0, math.sin, tracker=False)
     learnt = drive.controller.learnt
@@ -121,7 +78,7 @@ def test_the_first_measurement_after_a_gap_teaches_nothing():
 
 @pytest.mark.parametrize('tracker', [True, False])
 def test_switched_off_or_without_tracker_it_fades_to_nothing_and_comes_back_without_a_jump(tracker):
-    drive = Drive()
+    drive = DrivenPlay()
     _, learning = drive.run(14.0, math.sin)
     if tracker:
         drive.controller.deactivate()

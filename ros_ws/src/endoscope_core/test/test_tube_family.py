@@ -8,13 +8,7 @@ from wrong_way import wrong_way_motion
 
 from endoscope_core.errors import FileError, InputError
 from endoscope_core.physics import PlantDescription, simulate
-from endoscope_core.physics.family import (
-    CENTRE,
-    MOST_BENT,
-    TubeFamily,
-    load_family,
-    shipped_family,
-)
+from endoscope_core.physics.family import CENTRE, MOST_BENT, TubeFamily, load_family, shipped_family
 
 TICK = 5e-3
 
@@ -76,9 +70,3 @@ def test_no_tube_of_the_family_bends_the_wrong_way(amplitude_deg):
         made = simulate(PlantDescription(joints={'bend_x': joint}), command[:, None], TICK)
         wrong = wrong_way_motion(made.shaft_position[:, 0], made.bending_true[:, 0])
         assert wrong < np.deg2rad(0.3), bend_deg
-
-
-def test_motion_against_the_motor_is_seen():
-    motor = np.array([0.0, 1.0, 2.0, 3.0, 2.0, 1.0])
-    assert wrong_way_motion(motor, 0.5 * motor) == 0.0
-    assert wrong_way_motion(motor, [0.0, -0.2, 1.0, 1.5, 1.8, 0.0]) == pytest.approx(0.3)

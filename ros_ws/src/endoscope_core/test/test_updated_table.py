@@ -10,13 +10,7 @@ from endoscope_core.control import PhysicalParameters
 from endoscope_core.errors import FileError, InputError
 from endoscope_core.hysteresis import BoucWenParameters, DahlParameters
 from endoscope_core.hysteresis.memory_model import GREATEST_INVERSE_SLOPE
-from endoscope_core.identification import (
-    KINDS,
-    TableEntry,
-    UpdatedTable,
-    blend,
-    load_class_parameters,
-)
+from endoscope_core.identification import KINDS, TableEntry, UpdatedTable, blend
 from endoscope_core.physics import JointParameters
 
 OTHER = {
@@ -119,11 +113,3 @@ def test_kinds_that_differ_are_not_blended():
         blend(FIRST['bouc_wen'], FIRST['dahl'], 0.5)
     with pytest.raises(ValueError, match='weight'):
         blend(FIRST['dahl'], FIRST['dahl'], 1.5)
-
-
-@pytest.mark.parametrize('model', KINDS)
-def test_shipped_sets_of_every_model_make_a_table_over_the_classes(model):
-    table = UpdatedTable.of_classes(model, load_class_parameters(model=model))
-    assert len(table.entries) == 7
-    for size_deg in (41.0, 66.6, 99.0):
-        assert isinstance(table.parameters_for(math.radians(size_deg)), KINDS[model])

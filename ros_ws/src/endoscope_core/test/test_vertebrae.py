@@ -50,18 +50,6 @@ def poses_of_the_transforms(angles):
     return found
 
 
-def test_the_chain_leads_from_the_base_to_the_tip_without_a_gap():
-    links = [link.get('name') for link in ROBOT.iter('link')]
-    children = [joint.find('child').get('link') for joint in ROBOT.iter('joint')]
-    parents = [joint.find('parent').get('link') for joint in ROBOT.iter('joint')]
-    assert links == ['endoscope_base', *children]
-    assert parents == links[:-1]
-    assert children[-1] == 'endoscope_tip'
-    assert len(set(links)) == len(links)
-    turning = [j.get('name') for j in ROBOT.iter('joint') if j.get('type') == 'revolute']
-    assert turning == list(SECTION.joint_names)
-
-
 def test_nothing_has_to_be_fetched():
     shapes = {shape.tag for geometry in ROBOT.iter('geometry') for shape in geometry}
     assert shapes == {'cylinder', 'sphere'}
@@ -99,12 +87,6 @@ def test_every_joint_of_an_axis_turns_by_the_same_angle_within_its_limits():
         if j.get('type') == 'revolute'
     }
     assert all(abs(angle) < limits[name] for name, angle in angles.items())
-
-
-def test_frames_are_named_after_the_base():
-    section = Vertebrae(0.03, 'left_base')
-    assert section.tip_frame == 'left_tip'
-    assert {hinge.child.partition('_')[0] for hinge in section.hinges} == {'left'}
 
 
 def test_refuses_half_a_turn():

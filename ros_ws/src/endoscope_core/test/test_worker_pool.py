@@ -1,6 +1,5 @@
 """Workers end with what they were started for."""
 
-import os
 import signal
 import subprocess
 import sys
@@ -81,10 +80,3 @@ def test_an_error_gives_up_what_is_not_done():
         _until(endless.running, 'the task has begun')
         raise ZeroDivisionError
     assert endless.done()
-
-
-def test_left_in_order_it_waits_for_its_tasks():
-    with worker_pool(2) as pool:
-        futures = [pool.submit(os.getpid) for _ in range(4)]
-    assert all(future.done() for future in futures)
-    assert os.getpid() not in {future.result() for future in futures}

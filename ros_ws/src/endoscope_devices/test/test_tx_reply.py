@@ -32,10 +32,6 @@ def test_disabled_and_unplugged_tools_are_left_out():
     assert [tool.handle for tool in parse_tx(text)] == [0x0A]
 
 
-def test_no_tool_is_a_reply_too():
-    assert parse_tx('000000') == []
-
-
 @pytest.mark.parametrize(
     ('text', 'words'),
     [

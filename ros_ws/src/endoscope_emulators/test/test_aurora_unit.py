@@ -5,7 +5,7 @@ import struct
 import pytest
 
 from endoscope_devices.em_tracker.aurora_port import crc16
-from endoscope_devices.em_tracker.tx_reply import PortStatus, parse_tx
+from endoscope_devices.em_tracker.tx_reply import parse_tx
 from endoscope_emulators.aurora_unit import AuroraUnit, SensorView, sealed
 
 
@@ -81,16 +81,6 @@ def test_what_is_wrong_is_answered_by_its_error(before, command, error):
     assert bench.text(command) == f'ERROR{error}'
 
 
-def test_a_command_with_a_wrong_checksum_is_refused():
-    assert Bench().unit.answer(b'INIT:E3A6') == sealed('ERROR04')
-
-
-def test_commands_with_a_space_need_no_checksum():
-    bench = Bench()
-    assert bench.unit.answer(b'INIT ') == sealed('OKAY')
-    assert bench.unit.answer(b'PHSR 02') == sealed('010A001')
-
-
 def test_frames_come_at_40_hz_and_show_the_sensor_then():
     bench = Bench(lambda t: SensorView(position=(t, 0.0, -0.2)))
     bench.track()
@@ -103,15 +93,6 @@ def test_frames_come_at_40_hz_and_show_the_sensor_then():
     assert len(set(seen)) == 80
     for frame, x in seen:
         assert x == pytest.approx(frame / 40.0, abs=1e-5)
-
-
-def test_a_frame_is_there_after_its_latency():
-    bench = Bench(latency=0.02)
-    bench.track()
-    bench.clock.seconds = 100.0 + 10 / 40 + 0.019
-    assert parse_tx(bench.text('TX:0001'))[0].frame == 9
-    bench.clock.seconds += 0.002
-    assert parse_tx(bench.text('TX:0001'))[0].frame == 10
 
 
 def test_binary_and_text_say_the_same():
@@ -129,32 +110,3 @@ def test_binary_and_text_say_the_same():
     assert tool.frame == frame
     assert tool.position == pytest.approx(view.position)
     assert tool.orientation == pytest.approx(view.orientation)
-
-
-@pytest.mark.parametrize(
-    ('view', 'status', 'shown_on_request'),
-    [
-        (SensorView(out_of_volume=True), PortStatus.OUT_OF_VOLUME, True),
-        (SensorView(broken=True), PortStatus.SENSOR_BROKEN, False),
-        (None, PortStatus.OUT_OF_VOLUME, False),
-    ],
-)
-def test_a_sensor_that_is_not_seen_is_missing(view, status, shown_on_request):
-    bench = Bench(lambda _: view)
-    bench.track()
-    bench.clock.seconds += 1.0
-    tool = parse_tx(bench.text('TX:0001'))[0]
-    assert tool.position == ()
-    assert status in tool.status
-    assert bool(parse_tx(bench.text('TX:0801'))[0].position) is shown_on_request
-    assert bench.say('BX:0001')[8] == 0x02
-
-
-def test_after_a_reset_all_is_as_at_power_up():
-    bench = Bench()
-    bench.text('COMM:50000')
-    bench.track()
-    assert bench.unit.baud == 115200
-    assert bench.unit.reset() == b'RESETBE6F\r'
-    assert bench.unit.baud == 9600
-    assert bench.text('TX:0001') == 'ERROR10'

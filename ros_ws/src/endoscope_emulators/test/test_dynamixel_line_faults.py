@@ -83,32 +83,6 @@ def rig(tmp_path):
     rig.close()
 
 
-@pytest.mark.nightly
-def test_flipped_bits_make_no_wrong_reading(rig):
-    rig.emulator.do('damage_rate', 0.03)
-    rig.swing_until(lambda: sum(rig.bus.figures.failures.values()) > 10 and len(rig.readings) > 300)
-    rig.check_readings()
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize('late', [0.006, 0.05])
-def test_late_answers_are_not_taken_for_those_of_the_next_request(rig, late):
-    rig.emulator.do('delay_s', late)
-    rig.emulator.do('delayed', 12)
-    rig.swing(0.5)
-    assert sum(rig.bus.figures.failures.values()) > 0
-    before = len(rig.readings)
-    rig.swing_until(lambda: len(rig.readings) - before > 50)
-    rig.check_readings()
-
-
-@pytest.mark.nightly
-def test_repeated_answers_change_nothing(rig):
-    rig.emulator.do('repeated', 400)
-    rig.swing_until(lambda: len(rig.readings) > 300)
-    rig.check_readings()
-
-
 def stopped(rig, since):
     """The last positions of the first servo do not differ."""
     track = [p for _, p in rig.emulator.do('trace', 1, since)]
@@ -159,29 +133,6 @@ def test_a_servo_that_loses_power_gives_no_false_zero(rig):
     rig.check_readings()
 
 
-@pytest.mark.nightly
-def test_an_overload_is_named_and_ends_only_with_a_restart(rig):
-    rig.emulator.do('overload', 1)
-    rig.swing_until(lambda: 'servo 1 reports overload' in rig.motors.trouble())
-    assert not rig.bus.armed
-    assert 'hardware error' in rig.motors.health()['motor_x: error']
-    rig.motors.set_torque(True)
-    rig.swing_until(lambda: 'restart it' in rig.motors.trouble())
-    assert not rig.bus.armed
-    rig.motors.reboot()
-    rig.swing_until(lambda: rig.emulator.state(1)['hardware'] == 0)
-    rig.swing_until(lambda: rig.motors.trouble() == '')
-    assert not rig.bus.armed
-    rig.arm()
-
-
-@pytest.mark.nightly
-def test_a_brown_out_is_named(rig):
-    rig.emulator.do('supply', 1, 9.0)
-    rig.swing_until(lambda: 'servo 1 reports input voltage' in rig.motors.trouble())
-    assert not rig.bus.armed
-
-
 def test_a_node_that_no_longer_renews_its_goal_is_noticed(rig):
     deadline = time.monotonic() + PATIENCE_S
     # On a busy machine a servo may fall silent first.
@@ -195,24 +146,3 @@ def test_a_node_that_no_longer_renews_its_goal_is_noticed(rig):
     time.sleep(0.4)
     assert stopped(rig, since)
     assert rig.emulator.state(1)['torque'] == 1
-
-
-@pytest.mark.nightly
-def test_the_current_limit_of_the_firmware_stops_a_shaft(tmp_path):
-    with EmulatorProcess(stiffness=2.0) as emulator:
-        motors = opened(BusSettings(emulator.port, current_limit=0.3), MOUNTS)
-        try:
-            motors.set_torque(True)
-            reach, effort = 0.0, 0.0
-            end = time.monotonic() + 0.8
-            while time.monotonic() < end:
-                reading = motors.exchange((0.8, 0.0), 1)
-                if reading is not None:
-                    reach = max(reach, reading.position[0])
-                    effort = max(effort, reading.effort[0])
-                time.sleep(1e-3)
-        finally:
-            motors.close()
-    limit = 0.3 * 4.1 / 2.3
-    assert 0.9 * limit < effort <= limit
-    assert reach < 1.1 * limit / 2.0

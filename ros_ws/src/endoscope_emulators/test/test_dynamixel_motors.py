@@ -127,10 +127,7 @@ def test_a_setting_that_is_not_kept_is_refused_by_name(emulator):
 def test_torque_that_does_not_come_on_is_refused(emulator, motors):
     emulator.do('stick', 1, 64)
     drive(
-        motors,
-        (0.0, 0.0),
-        lambda: 'does not switch its torque on' in motors.trouble(),
-        arming=True,
+        motors, (0.0, 0.0), lambda: 'does not switch its torque on' in motors.trouble(), arming=True
     )
     assert not motors.bus.armed
 
@@ -193,15 +190,6 @@ def test_an_adapter_that_goes_away_under_the_doctor_is_named(port_that_goes_away
     assert 'the adapter is gone' in advice
 
 
-def test_four_and_a_half_megabaud():
-    with EmulatorProcess(baud=4_500_000) as emulator:
-        motors = opened(BusSettings(emulator.port, 4_500_000), MOUNTS)
-        try:
-            drive(motors, (0.0, 0.0), lambda: motors.bus.figures.readings > 50)
-        finally:
-            motors.close()
-
-
 @pytest.fixture
 def line():
     with EmulatedBus([EmulatedServo(1)]) as line:
@@ -224,10 +212,7 @@ def test_a_goal_that_is_not_where_the_shaft_is_is_refused(line):
             line.servos[1].stuck = {116}
         drive(motors, (0.2,), near(motors, (0.2,)))
         drive(
-            motors,
-            (0.2,),
-            lambda: 'Goal Position(116) reads 2048' in motors.trouble(),
-            arming=True,
+            motors, (0.2,), lambda: 'Goal Position(116) reads 2048' in motors.trouble(), arming=True
         )
         assert line.servos[1].value(TORQUE_ENABLE) == 0
         assert not motors.bus.armed
@@ -277,10 +262,6 @@ def test_the_alert_bit_is_kept_with_the_value(line, handler):
     reply = handler.read(1, 132, 4)
     assert reply.error == ALERT
     assert reply.data == (2048).to_bytes(4, 'little')
-
-
-def test_emulated_servos_are_not_taken_for_real_ones(motors):
-    assert motors.kind is Kind.EMULATED
 
 
 @pytest.mark.parametrize(('marked', 'kind'), [((), Kind.REAL), ((2,), Kind.EMULATED)])

@@ -45,7 +45,7 @@ def make_recording(
 ) -> Recording:
     """Sensors' readings of a plant under a shaft command, or swept, stepped and held."""
     plant = plant or PlantDescription()
-    n = int(duration / TICK)
+    n = int(duration / TICK) if command is None else len(command)
     time = TICK * np.arange(n)
     joints = plant.joint_names()
     swept = 0.9 * np.sin(1.3 * time)

@@ -1,4 +1,3 @@
-import dataclasses
 from dataclasses import replace
 
 import numpy as np
@@ -6,24 +5,24 @@ import pytest
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit import Severity, audit_recording
-from endoscope_explain.audit.stamps import retimed
 from endoscope_explain.audit.wrong_samples import spike_chance
-from endoscope_explain.recording import Recording, Series
 
 PLANT = PlantDescription()
 
 
 @pytest.fixture(scope='module')
-def sound(record) -> Recording:
+def sound(record):
     return record()
 
 
-def named(recording: Recording) -> dict[str, object]:
+def named(recording):
     return {f.id: f for f in audit_recording(recording, PLANT).findings}
 
 
-def changed(series: Series, **fields: object) -> Series:
-    return dataclasses.replace(series, **fields)
+def audited(recording, quantity, **fields):
+    """The audit of a recording of which a series has other times or values."""
+    series = replace(recording.measured()[quantity], **fields)
+    return audit_recording(recording.with_series({quantity: series}), PLANT)
 
 
 def test_a_sound_recording_has_no_findings_and_stays_as_it_is(sound):
@@ -144,7 +143,7 @@ def test_swapped_neighbours_are_put_in_order(sound):
 def test_stamps_that_jitter_are_noted_with_how_much(sound, quantity, jitter):
     series = sound.measured()[quantity]
     off = np.random.default_rng(1).normal(0.0, jitter, len(series.time))
-    finding = named(sound.with_series({quantity: changed(series, time=series.time + off)}))
+    finding = named(sound.with_series({quantity: replace(series, time=series.time + off)}))
     noted = finding['jittering_stamps']
     assert (noted.signals, noted.severity) == ((series.topic,), Severity.NOTE)
     assert noted.evidence['jitter_s'] == pytest.approx(jitter, rel=0.1)
@@ -153,16 +152,14 @@ def test_stamps_that_jitter_are_noted_with_how_much(sound, quantity, jitter):
 def test_a_clock_that_is_set_back_is_a_fault(sound):
     time = sound.bending.time.copy()
     time[300:] -= 1.0
-    finding = named(sound.with_series({'bending': changed(sound.bending, time=time)}))
+    finding = named(sound.with_series({'bending': replace(sound.bending, time=time)}))
     assert finding['unordered_stamps'].severity is Severity.FAULT
 
 
 def test_a_frozen_cell_is_found_and_not_judged(sound):
     values = sound.tension.values.copy()
     values[3000:3400, 0, 1] = values[3000, 0, 1]
-    report = audit_recording(
-        sound.with_series({'tension': changed(sound.tension, values=values)}), PLANT
-    )
+    report = audited(sound, 'tension', values=values)
     (finding,) = report.findings
     assert (finding.id, finding.signals) == ('held_samples', ('wires/measured_js:wire_x_neg',))
     assert not report.recording.tension.valid[3001:3400, 0, 1].any()
@@ -172,8 +169,7 @@ def test_a_frozen_cell_is_found_and_not_judged(sound):
 def test_a_motor_that_repeats_an_old_position_is_found_and_not_judged(sound):
     values = sound.shaft_position.values.copy()
     values[3000:3400, 0] = values[3000, 0]
-    position = changed(sound.shaft_position, values=values)
-    report = audit_recording(sound.with_series({'shaft_position': position}), PLANT)
+    report = audited(sound, 'shaft_position', values=values)
     (finding,) = report.findings
     assert finding.id == 'held_samples'
     assert finding.signals == ('motor/measured_js:motor_x.position',)
@@ -187,21 +183,19 @@ def test_a_motor_that_rests_is_no_fault(sound):
     position = sound.shaft_position
     rest = np.searchsorted(position.time, [3.0, 3.5])
     at = np.r_[: rest[0], np.full(500, rest[0]), rest[0] : len(position.time) - 500]
-    resting = changed(position, values=position.values[at])
+    resting = replace(position, values=position.values[at])
     assert 'held_samples' not in named(sound.with_series({'shaft_position': resting}))
 
 
 def test_a_coarse_tracker_that_stands_still_with_the_rig_is_no_fault(sound):
     coarse = np.round(sound.bending.values / 0.03) * 0.03
-    assert named(sound.with_series({'bending': changed(sound.bending, values=coarse)})) == {}
+    assert named(sound.with_series({'bending': replace(sound.bending, values=coarse)})) == {}
 
 
 def test_clipping_is_named_with_wire_and_limit(sound):
     values = np.minimum(sound.tension.values, np.array([np.inf, 9.0])[None, None, :])
     values[:, 1] = sound.tension.values[:, 1]
-    report = audit_recording(
-        sound.with_series({'tension': changed(sound.tension, values=values)}), PLANT
-    )
+    report = audited(sound, 'tension', values=values)
     (finding,) = report.findings
     assert (finding.id, finding.joint) == ('load_cell_saturation', 'bend_x')
     assert finding.parameters['limit_n'].value == pytest.approx(9.0)
@@ -215,9 +209,7 @@ def test_isolated_wrong_tracker_samples_are_found(sound, size, share):
     values = sound.bending.values.copy()
     wrong = rng.choice(np.arange(10, len(values) - 10), int(share * len(values)), replace=False)
     values[wrong, 1] += size * rng.choice([-1, 1], len(wrong))
-    report = audit_recording(
-        sound.with_series({'bending': changed(sound.bending, values=values)}), PLANT
-    )
+    report = audited(sound, 'bending', values=values)
     (finding,) = report.findings
     assert (finding.id, finding.joint) == ('tracker_outliers', 'bend_y')
     masked = ~report.recording.bending.valid[:, 1]
@@ -238,18 +230,13 @@ def test_a_skewed_clock_shows_in_the_times_of_receipt(sound, skew):
     rng = np.random.default_rng(5)
     every = {'command': sound.command, **sound.measured()}
     received = {
-        name: changed(s, received=s.time + 2e-4 + rng.exponential(3e-4, len(s.time)))
+        name: replace(s, received=s.time + 2e-4 + rng.exponential(3e-4, len(s.time)))
         for name, s in every.items()
     }
     tracker = received['bending']
-    received['bending'] = changed(tracker, time=tracker.time * (1.0 + skew))
+    received['bending'] = replace(tracker, time=tracker.time * (1.0 + skew))
     report = audit_recording(sound.with_series(received), PLANT)
     finding = next(f for f in report.findings if f.id == 'clock_skew')
     assert finding.signals == ('slave/measured_js',)
     assert finding.parameters['skew'].value == pytest.approx(skew, rel=0.05)
     assert report.recording.bending.time == pytest.approx(sound.bending.time, abs=1e-3)
-
-
-def test_retiming_undoes_a_skew(sound):
-    fast = changed(sound.bending, time=1.0 + 1.01 * (sound.bending.time - 1.0))
-    assert retimed(fast, 0.01, start=1.0).time == pytest.approx(sound.bending.time)

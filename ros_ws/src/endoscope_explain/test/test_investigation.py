@@ -17,20 +17,10 @@ from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import hold, move, sequence
 from endoscope_core.signals.command_file import JOINTS, CommandTable, read_command_file
 from endoscope_explain.audit import audit_recording
-from endoscope_explain.explanation import Estimate, Verdict
+from endoscope_explain.explanation import Verdict
 from endoscope_explain.investigation import page
-from endoscope_explain.investigation.investigation import (
-    Investigation,
-    investigate,
-)
-from endoscope_explain.investigation.log import (
-    LOG_MD,
-    PLANT,
-    Stop,
-    Tracking,
-    begun,
-    tracking,
-)
+from endoscope_explain.investigation.investigation import Investigation, investigate
+from endoscope_explain.investigation.log import LOG_MD, PLANT, Stop, begun
 from endoscope_explain.investigation.motions import (
     Motion,
     MotionRefusedError,
@@ -225,22 +215,6 @@ def test_numbers_that_an_effect_may_stand_for_are_asked_about(both, told):
     assert log.stopped is not Stop.ONE_CLASS
 
 
-def test_an_end_says_what_stays_open_and_what_an_error_of_the_tip_includes(both, told):
-    (effect,) = told.effects
-    first = effect.definition.parameters[0].name
-    open_ = {**effect.parameters, first: Estimate(0.5, 0.1, 2.0, '-')}
-    wide = dataclasses.replace(told, effects=(dataclasses.replace(effect, parameters=open_),))
-    dropped = dataclasses.replace(both, experiments=0)
-    log = investigate(dropped, no_rig, lambda bags: wide)
-    assert log.stopped is Stop.USED_UP
-    assert 'How strong stribeck_friction is stays open: rise 0.5 (0.1 to 2)' in log.words
-    seen = dataclasses.replace(log, tracking=(Tracking('described', '', 1.0),) * 2)
-    assert 'tracker' not in tracking(seen)
-    names = (dataclasses.replace(log.last_answer.names[0], id='tracker_bias'),)
-    answer = dataclasses.replace(log.last_answer, names=names)
-    assert 'so that tracker_bias counts as an error' in tracking(seen.with_last(answer=answer))
-
-
 def test_a_comparison_that_nobody_wants_leaves_what_is_known(both, told):
     asked = []
 
@@ -256,15 +230,6 @@ def test_a_comparison_that_nobody_wants_leaves_what_is_known(both, told):
     assert 'Held-out motion of bend_x and bend_y, 20 s' in words
     assert plant == both.plant_file
     assert 'not measured: the motion was not wanted' in (both.folder / LOG_MD).read_text()
-
-
-def test_a_motion_that_nobody_wants_is_not_played(both, told):
-    def declined(motion, file, bag):
-        raise NotPlayedError('the operator answered no')
-
-    log = investigate(both, declined, lambda bags: told)
-    assert log.stopped is Stop.INTERRUPTED
-    assert log.last_answer is None
 
 
 def test_what_is_at_its_end_is_not_begun_again(both, told):
@@ -338,10 +303,3 @@ def test_a_motion_that_is_too_fast_is_refused():
     motion = Motion('jump', 'bend_x', '', CommandTable(JOINTS, time, angle))
     with pytest.raises(MotionRefusedError, match='speed is 10 rad/s'):
         require_allowed(motion, RIG)
-
-
-def test_physics_without_a_name_is_not_said_to_be_one(both, told):
-    unnamed = dataclasses.replace(told, verdict=Verdict.UNKNOWN_PHYSICS, effects=())
-    log = investigate(both, no_rig, lambda bags: unnamed)
-    assert log.stopped is Stop.ONE_CLASS
-    assert 'what is missing has no name, and so no rival, after one motion' in log.words

@@ -16,9 +16,7 @@ def located(record, effect_id, joint='bend_x', **parameters):
     plant = dataclasses.replace(PLANT, effects=(spec,))
     recording = record(plant, duration=15.0)
     effect = NamedEffect(
-        effect_id,
-        joint,
-        {k: Estimate(v, v, v, '-') for k, v in parameters.items()},
+        effect_id, joint, {k: Estimate(v, v, v, '-') for k, v in parameters.items()}
     )
     (place,) = locate_effects(recording, plant, [effect])
     return place

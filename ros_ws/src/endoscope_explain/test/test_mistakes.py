@@ -110,23 +110,6 @@ def test_what_no_unit_makes_fit_is_fitted_as_recorded_and_that_is_said(record):
     np.testing.assert_array_equal(audit.recording.bending.values, shaken)
 
 
-def test_the_readings_are_handed_on_as_they_must_be_meant(record):
-    sound = record()
-    degrees = replace(sound.bending, values=np.degrees(sound.bending.values))
-    audit = audit_recording(sound.with_series({'bending': degrees}), PlantDescription())
-    np.testing.assert_allclose(audit.recording.bending.values, sound.bending.values)
-
-
-def test_plugs_that_were_exchanged_are_at_the_sensors(record):
-    sound = record()
-    swapped = replace(sound.tension, values=sound.tension.values[:, ::-1])
-    plant = PlantDescription()
-    audit = audit_recording(sound.with_series({'tension': swapped}), plant)
-    np.testing.assert_array_equal(audit.recording.tension.values, sound.tension.values)
-    (mistake,) = audit.mistakes()
-    assert mistake.stage == 'sensing'
-
-
 def test_forces_of_another_rig_are_no_counts_of_a_converter(record):
     own = JointParameters()
     thrice = {n: 3.0 * getattr(own, n) for n in ('pretension', 'wire_stiffness', 'joint_stiffness')}
@@ -136,26 +119,6 @@ def test_forces_of_another_rig_are_no_counts_of_a_converter(record):
     counts = replace(other.tension, values=2.0 * other.tension.values)
     (finding,) = audit_recording(other.with_series({'tension': counts}), plant).faults()
     assert 'counts of a converter' in finding.text
-
-
-def test_a_pause_that_ends_at_another_pose_is_no_gap(record):
-    """A master that was let go begins anew where the rig is, not where it commanded last."""
-    sound = record()
-    command = sound.command
-    begin = int(np.searchsorted(command.time, 5.0))
-    end = begin + 2000
-    held = {}
-    for name, series in {'command': command, **sound.measured()}.items():
-        since = int(np.searchsorted(series.time, 4.0))
-        until = int(np.searchsorted(series.time, 7.0))
-        values = series.values.copy()
-        if name in ('shaft_position', 'command'):
-            values[since:until] = values[since]
-        held[name] = replace(series, values=values)
-    times = np.r_[:begin, end : len(command.time)]
-    held['command'] = held['command'].taken(times)
-    audit = audit_recording(sound.with_series(held), PlantDescription())
-    assert 'recording_gap' not in {f.id for f in audit.findings}
 
 
 @pytest.mark.engine

@@ -17,12 +17,7 @@ from endoscope_explain.design import (
 from endoscope_explain.explanation import NamedEffect
 
 PLANT = PlantDescription()
-RIVALLED = NamedEffect(
-    'transport_delay',
-    'bend_x',
-    {},
-    ('actuator_lag',),
-)
+RIVALLED = NamedEffect('transport_delay', 'bend_x', {}, ('actuator_lag',))
 
 
 def with_effect(effect_id, **parameters):

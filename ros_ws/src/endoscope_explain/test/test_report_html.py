@@ -11,7 +11,7 @@ from chromium import LARGEST_PAGE, drawn
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.rig import Kind, RigKind
-from endoscope_explain.audit import AuditReport, Finding, Severity
+from endoscope_explain.audit import AuditReport
 from endoscope_explain.case import NextExperiment, Provenance
 from endoscope_explain.explanation import (
     Estimate,
@@ -111,43 +111,11 @@ def test_a_page_says_of_what_kind_of_rig_its_recording_is(page, stribeck_case):
     assert 'rig emulated (endoscope 9)' in text_of(told)
 
 
-def test_a_page_needs_no_other_file(page):
-    assert not re.findall(r'(?:src|href)\s*=\s*["\'](?!#|data:)', page)
-    assert '@import' not in page
-    # Fragments of the same page, and namespaces, are not fetched.
-    assert not re.findall(r'url\((?!#)', page)
-
-
 def test_a_page_says_what_was_left_out_and_where(page):
     text = text_of(page)
     assert 'The simulation leaves out stribeck_friction or viscous_friction on bend_x.' in text
     assert 'cannot distinguish it from viscous_friction' in text
     assert 'gain 120 (log evidence that it adds, in nats)' in text
-
-
-def test_a_page_lists_all_that_was_tried(page):
-    text = text_of(page)
-    assert 'no effect, numbers beyond their tolerance 60.0 50.0' in text
-    assert 'gravity + breathing 70.0 60.0' in text
-    assert 'No effect was tried on bend_y: the refitted plant leaves noise alone.' in text
-    (rest,) = re.findall(r'predicted a smaller gain: ([^.]*)\.', text)
-    tried = {'stribeck_friction', 'gravity', 'contact', 'breathing'}
-    (late,) = re.findall(r'no motion twice: ([^.]*)\.', text) or ['']
-    simulated = {e.id for e in CATALOGUE.values() if not e.traits.audited}
-    assert {*rest.split(', '), *filter(None, late.split(', '))} == simulated - tried
-
-
-def test_a_page_says_what_it_was_made_from(page):
-    text = text_of(page)
-    for word in (
-        'bags/rig',
-        'a1' * 32,
-        'plant.yaml',
-        'b2' * 32,
-        'endoscope x',
-        'endoscope 1.2, today',
-    ):
-        assert word in text
 
 
 def test_every_drawing_is_whole(page):
@@ -293,21 +261,25 @@ def test_a_formula_that_explains_little_is_not_offered(
     stribeck_case, missing_function, share, offered
 ):
     term = dataclasses.replace(missing_function, formula_share=share, formula_is_as_good=False)
-    page = html_page(
-        with_explanation(stribeck_case, effects=(), unknown=term, verdict=Verdict.UNKNOWN_PHYSICS)
+    distances = {'chirp': 1.0, 'slow ramps': 4.0}
+    asked = NextExperiment(
+        *('It tells gravity from contact.', ('gravity', 'contact'), 'slow ramps', 'bend_x'),
+        *(distances, (0.0, 1.0), ((0.0, 0.0), (0.1, 0.0)), ('bend_x', 'bend_y')),
     )
+    case = with_explanation(
+        stribeck_case,
+        effects=(),
+        unknown=term,
+        verdict=Verdict.UNKNOWN_PHYSICS,
+        next_experiment=asked,
+    )
+    page = html_page(case)
     assert (term.expression in page) == offered
-    # The picture comes first, in degrees; the formula is below it.
     first = page[page.index('<figure') : page.index('</figure>')]
     assert ('>formula<' in first) == offered
     assert 'function, with 90 % band' in first
-    assert 'joint&#39;s angle (deg)' in first or "joint's angle (deg)" in first
-    assert (
-        verdict_sentence(
-            with_explanation(stribeck_case, unknown=term, verdict=Verdict.UNKNOWN_PHYSICS)
-        )
-        == "Missing on bend_x: moment on the joint, a function of the joint's angle."
-    )
+    assert 'It tells gravity from contact.' in page
+    assert page.index('slow ramps') < page.index('>chirp<')
 
 
 def test_a_formula_lies_on_its_function_in_a_unit_that_can_be_read(stribeck_case, missing_function):
@@ -323,67 +295,7 @@ def test_a_formula_lies_on_its_function_in_a_unit_that_can_be_read(stribeck_case
     assert 'load_of_angle of bend_x (µN m)' in page
 
 
-NOTHING_CUT = """() => 0 >= Math.max(
-  ...[...document.querySelectorAll('svg[role=img]')].map((svg) => {
-    const {right} = svg.getBoundingClientRect();
-    return Math.max(...[...svg.querySelectorAll('text')].map(
-      (text) => text.getBoundingClientRect().right - right));
-  }),
-  ...[...document.querySelectorAll('.scroll, body, html')].map(
-    (e) => e.scrollWidth - e.clientWidth))"""
 """Whether what is drawn or written is no wider than the room that it has."""
-
-
-def test_nothing_is_cut_on_a_screen_of_any_width(stribeck_case):
-    with drawn(html_page(stribeck_case)) as (seen, complaints):
-        for width in (1000, 1040, 1440, 1920):
-            seen.set_viewport_size({'width': width, 'height': 900})
-            # Plots follow the window a moment later.
-            seen.wait_for_function(NOTHING_CUT)
-            next_step = seen.get_by_text('Next:').bounding_box()
-            assert next_step['y'] < 250.0, width
-    assert complaints == []
-
-
-def test_the_next_step_is_said_once_and_at_the_top(page, stribeck_case):
-    text = text_of(page)
-    assert text.count(next_step(stribeck_case)) == 1
-    assert text.index(next_step(stribeck_case)) < text.index('What was left out')
-
-
-def test_unknown_physics_and_the_next_experiment_are_drawn(stribeck_case, missing_function):
-    time = np.linspace(0.0, 10.0, 200)
-    experiment = NextExperiment(
-        'It tells gravity from contact.',
-        ('gravity', 'contact'),
-        'slow ramps',
-        'bend_x',
-        {'chirp': 1.0, 'slow ramps': 4.0},
-        tuple(time),
-        tuple((float(v), 0.0) for v in np.sin(time)),
-        ('bend_x', 'bend_y'),
-    )
-    explanation = dataclasses.replace(stribeck_case.explanation, unknown=missing_function)
-    page = html_page(
-        dataclasses.replace(
-            stribeck_case,
-            explanation=explanation,
-            verdict=Verdict.UNKNOWN_PHYSICS,
-            next_experiment=experiment,
-        )
-    )
-    assert missing_function.expression in page
-    assert 'It tells gravity from contact.' in page
-    assert page.index('slow ramps') < page.index('>chirp<')
-
-
-def test_one_word_for_each_plant(page, consistent):
-    for text in (page, html_page(consistent)):
-        for word in ('nominal', 'augmented', 'with what was left out', 'as given', 'plant given'):
-            assert word not in re.sub(r'<(style|script).*?</\1>', '', text, flags=re.DOTALL)
-        assert 'described' in text
-        assert 'refitted' in text
-    assert 'improved' in page
 
 
 def test_sections_and_curves_fit_a_consistent_verdict(consistent):
@@ -424,34 +336,6 @@ def test_angles_are_in_degrees(page):
     assert in_degrees('motor_bandwidth', 'rad/s') == ('motor_bandwidth', 'rad/s', 1.0)
 
 
-def test_a_narrow_interval_keeps_its_ends():
-    assert str(shown('gain', Estimate(1.2, 1.1996, 1.2004, '-'))) == 'gain 1.2 (1.1996 to 1.2004)'
-    assert shown('wire_stiffness', Estimate(3000.0, 2990.0, 3010.0, 'N/m')).value == '3000'
-
-
-def test_digits_that_the_interval_does_not_know_are_left_out():
-    assert str(shown('profile', Estimate(-1.08e-5, -0.00366, 0.00363, '-'))) == (
-        'profile 0 (-0.00366 to 0.00363)'
-    )
-
-
-def test_of_what_does_not_move_no_loop_is_drawn(consistent):
-    recording = consistent.recording
-    series = {'command': recording.command, 'shaft_position': recording.shaft_position}
-    still = {n: dataclasses.replace(s, values=0.0 * s.values) for n, s in series.items()}
-    nothing = with_explanation(
-        consistent,
-        recording=recording.with_series(still),
-        verdict=Verdict.INSUFFICIENT_DATA,
-        fit={},
-        ladder={'nominal': {}, 'refitted': {}, 'augmented': {}},
-    )
-    assert 'Hysteresis loops' in html_page(consistent)
-    page = html_page(nothing)
-    assert 'Hysteresis loops' not in page
-    assert 'What was recorded' in page
-
-
 def test_switches_are_said_in_words(stribeck_case):
     effect = named('load_cell_gain', gain=1.2, wire=1.0)
     case = dataclasses.replace(stribeck_case, effects=(effect,))
@@ -482,35 +366,6 @@ def test_the_terminal_says_it_all(stribeck_case):
     assert lines[-1].startswith('Next: ')
 
 
-def test_the_block_that_was_touched_is_marked(stribeck_case):
-    finding = Finding(
-        'exchanged',
-        Severity.MISTAKE,
-        'bend_x',
-        'sensing',
-        ('wires/measured_js:wire_x_pos',),
-        ((0.0, 1.0),),
-        'wires are exchanged',
-        'exchange their names, or the plugs',
-    )
-    audit = AuditReport(stribeck_case.recording, (finding,))
-    place = dataclasses.replace(stribeck_case.places[0], stage='sensing')
-    explanation = dataclasses.replace(
-        stribeck_case.explanation, effects=(), verdict=Verdict.CONSISTENT
-    )
-    case = dataclasses.replace(
-        stribeck_case,
-        verdict=Verdict.RECORDING_FAULT,
-        effects=(),
-        audit=audit,
-        places=(place,),
-        explanation=explanation,
-    )
-    (red,) = [text for text, marked in stages(html_page(case)) if marked]
-    assert red == 'sensing load cells, tracker recording fault (bend_x)'
-    assert next_step(case) == 'Exchange their names, or the plugs.'
-
-
 def test_slips_that_nothing_predicts_are_said(consistent):
     assert 'stick and slip' not in text_of(html_page(consistent))
     spiky = consistent.recording.tension.values.copy()
@@ -521,3 +376,14 @@ def test_slips_that_nothing_predicts_are_said(consistent):
     recording = dataclasses.replace(consistent.recording, tension=tension)
     text = text_of(html_page(dataclasses.replace(consistent, recording=recording)))
     assert 'bend_x: wires stick and slip' in text
+
+
+@pytest.mark.parametrize(
+    ('estimate', 'said'),
+    [
+        (Estimate(1.2, 1.1996, 1.2004, '-'), 'gain 1.2 (1.1996 to 1.2004)'),
+        (Estimate(-1.08e-5, -0.00366, 0.00363, '-'), 'gain 0 (-0.00366 to 0.00363)'),
+    ],
+)
+def test_a_number_has_the_digits_that_its_interval_knows(estimate, said):
+    assert str(shown('gain', estimate)) == said

@@ -1,11 +1,9 @@
 """What the report says of strokes that were made once only."""
 
-import dataclasses
 import html
 
 import pytest
 
-from endoscope_explain.explanation import Verdict
 from endoscope_explain.observe.revisits import Stroke
 from endoscope_explain.report.html_page import html_page
 from endoscope_explain.report.sentences import told
@@ -24,10 +22,6 @@ def fall(revisited, low=-1.0, high=1.0):
 def test_of_what_was_made_twice_nothing_is_said():
     assert once_only('bend_x', [rise(1.0), fall(0.9), rise(0.8), fall(1.0)]) == ''
     assert once_only('bend_x', []) == ''
-
-
-def test_the_first_stroke_from_the_middle_is_not_asked_for_again():
-    assert once_only('bend_x', [rise(0.0, low=0.0), fall(1.0), rise(1.0)]) == ''
 
 
 def test_strokes_that_were_made_once_only_are_named_in_degrees():
@@ -65,16 +59,3 @@ def test_page_and_terminal_say_it_in_one_line_of_each_joint(sound):
     assert page.count(said) == 1
     assert page.index('held-out parts of this recording') < page.index(said)
     assert 'made twice' not in str(report_mapping(sound))
-
-
-def test_of_a_longer_recording_the_strokes_are_named(corpus):
-    (said,) = visited_once(corpus.case('unknown'))
-    assert said == (
-        'bend_x: 3 of 4 wide strokes were made twice; made once only: the rise from -52 to 52 deg. '
-        'What depends on the bend there was fitted, but could not be checked.'
-    )
-
-
-def test_where_nothing_was_fitted_nothing_is_said(sound):
-    nothing = dataclasses.replace(sound.explanation, fit={}, verdict=Verdict.INSUFFICIENT_DATA)
-    assert visited_once(dataclasses.replace(sound, explanation=nothing)) == []

@@ -91,10 +91,7 @@ def answer(joint, shaft):
 
 def commanded(law, angle, velocity):
     """Shaft commands (N,) of a feed-forward law for a desired angle."""
-    motion, feedforward = (
-        DesiredMotion(2),
-        Feedforward(2, FeedforwardSettings(LIMITS)),
-    )
+    motion, feedforward = (DesiredMotion(2), Feedforward(2, FeedforwardSettings(LIMITS)))
     feedforward.select(law)
     commands = []
     for a, v in zip(angle.tolist(), velocity.tolist(), strict=True):

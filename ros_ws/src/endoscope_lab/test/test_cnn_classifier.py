@@ -7,12 +7,10 @@ import pytest
 
 from endoscope_core.classifier.classification import ClassifierError, UnseenTensionError
 from endoscope_core.classifier.cnn_classifier import (
-    CHANNELS,
     INPUT,
     CnnClassifier,
     HeldOutCalibration,
     Judgement,
-    cnn_shapes,
     course,
 )
 from endoscope_core.classifier.weights_file import load_classifier
@@ -36,13 +34,6 @@ def judgement(size_deg, none=0.0, distance=0.0, gap=0.0):
 
 def strict():
     return CnnClassifier({}, HeldOutCalibration(1.0, 9.0, 0.5), CLASSES_DEG, 'sinusoid')
-
-
-def test_the_tensions_of_standing_motors_are_refused(shipped):
-    samples = calibration_motion(shipped.motion).samples
-    still = np.random.default_rng(0).normal(5.0, 0.02, (samples, 4))
-    with pytest.raises(UnseenTensionError, match='none of the classes: '):
-        shipped.classify(still)
 
 
 def test_the_slave_that_is_simulated_by_default_is_known(shipped):
@@ -106,18 +97,6 @@ def test_the_course_is_the_logarithm_of_what_has_settled(motion):
     assert read.shape == (INPUT, 4)
     np.testing.assert_allclose(read[[0, -1], 0], np.log(time[[begin, -1]] + 0.5), rtol=1e-5)
     np.testing.assert_allclose(read[:, 2:], np.log(0.5), rtol=1e-6)
-
-
-def test_eight_strides_of_three_leave_one_feature_vector():
-    assert INPUT == 3 ** len(CHANNELS) == 6561
-    weights = {k: np.zeros(s, np.float32) for k, s in cnn_shapes(7).items()}
-    weights['scale'] += 1.0
-    weights['bias'] += np.float32(0.5)
-    found = CnnClassifier(
-        weights, HeldOutCalibration(1.0, 1.0, 0.5), CLASSES_DEG, 'sinusoid'
-    ).judged(np.ones((2, INPUT, 4), np.float32))
-    np.testing.assert_allclose(np.rad2deg(found.size), 80.0, rtol=1e-6)
-    np.testing.assert_allclose(found.none, 1.0 / (1.0 + np.exp(-0.5)))
 
 
 def test_intervals_hold_their_nominal_share_and_known_tubes_pass():

@@ -1,38 +1,16 @@
 """Concealed rigs that are asked for motions: what is played, and what counts."""
 
-import time
-
 import numpy as np
 import pytest
 
-from endoscope_bringup import cli
 from endoscope_core.physics import PlantDescription
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals.command_file import JOINTS, CommandTable
 from endoscope_explain.investigation.motions import Motion, commissioning, require_allowed
 from endoscope_explain.takes import recordings_joined
-from endoscope_lab.concealed.trial import failed
-from endoscope_lab.investigate import (
-    ASKED,
-    COMMISSIONED,
-    FIXED,
-    KINDS,
-    Asked,
-    SimulatedRig,
-    asked,
-    drawn_rig,
-    fixed_motion,
-    kind_of,
-    table,
-)
+from endoscope_lab.investigate import FIXED, KINDS, SimulatedRig, drawn_rig, fixed_motion
 
 RIG = shipped_rig()
-
-
-def test_one_rig_in_four_has_two_effects_and_two_are_of_the_other_simulator():
-    kinds = [kind_of(seed) for seed in range(1, 5)]
-    assert kinds == ['other_simulator', 'catalogue', 'other_simulator', 'pairs']
-    assert kinds == [kind_of(seed) for seed in range(8001, 8005)]
 
 
 @pytest.mark.parametrize(
@@ -90,20 +68,3 @@ def test_the_fixed_motion_is_allowed_and_begins_as_the_asked_one(joints):
     require_allowed(Motion(FIXED, '', '', longer), RIG)
     moved = np.abs(longer.angle[len(first.table.time) :]).max(axis=0) > 0.1
     assert moved.tolist() == [joint in joints for joint in longer.joints]
-
-
-def test_a_rig_that_failed_is_wrong_by_every_way():
-    row = vars(failed('pairs', 4, RuntimeError('why')))
-    rows = [Asked(**row, by=by) for by in (COMMISSIONED, ASKED, FIXED)]
-    lines = table(rows).splitlines()
-    assert [line.split(' | ')[0] for line in lines[2:]] == ['| two effects'] * 3 + ['| all'] * 3
-    assert all(' | 0 % | ' in line for line in lines[2:])
-
-
-def test_what_was_not_begun_in_time_is_not_counted(capsys, tmp_path):
-    assert asked('catalogue', 2, 1.0, time.time() - 1.0, None) == []
-    rows = tmp_path / 'rows.jsonl'
-    words = ['bench', 'investigate', '--seeds', '2', '--minutes', '0', '--json', str(rows)]
-    assert cli.main(words) == 0
-    assert '0 of 1 rigs' in capsys.readouterr().out
-    assert not rows.exists()

@@ -13,7 +13,7 @@ from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.recording import recording_from_bag
 from endoscope_lab.concealed import motions
 from endoscope_lab.concealed.another_rig import FEW_NODES, FORMS, Laws, drawn_laws, read
-from endoscope_lab.concealed.judge import Statement, judged, law_of_effect
+from endoscope_lab.concealed.judge import judged
 from endoscope_lab.concealed.readings import as_sensed
 from endoscope_lab.concealed.readings import read as read_of_kernel
 from endoscope_lab.concealed.rigs import described_rig, true_rig
@@ -31,7 +31,6 @@ from endoscope_lab.proof.trial import (
     seal,
     write_bag,
 )
-from endoscope_lab.prove_command import SIMULATORS as OFFERED
 
 SHORT = 9000
 """Ticks."""
@@ -111,30 +110,6 @@ def outcome(laws, said, after=1.0):
     return Outcome(rig, answer, {}, judged(laws, answer.said))
 
 
-def test_what_is_right_and_what_is_not_is_said_in_words():
-    gravity = law_of_effect('gravity', 'bend_x')
-    named = Statement('gravity', 'bend_x', 'joint')
-    stop = Statement('joint_stop', 'bend_x', 'joint')
-    creep = Statement('wire_creep', 'bend_x', 'transmission')
-    told = {
-        'right': outcome([gravity], [named]),
-        'wrong: nothing was concealed': outcome([], [named]),
-        'right, and more is named beside it': outcome([gravity], [named, creep]),
-        'among the names that it cannot tell apart': outcome(
-            [gravity], [replace(creep, rivals=('gravity',))]
-        ),
-        'the right place by another name': outcome([gravity], [stop]),
-        'wrong': outcome([gravity], [creep], after=4.0),
-        'missed': outcome([gravity], []),
-    }
-    for words, one in told.items():
-        assert sentences.result(one) == words
-    assert sentences.why(told['right']) == ''
-    assert '4 times the noise' in sentences.why(told['wrong'])
-    assert '5 times its noise' in sentences.why(told['missed'])
-    assert sentences.headline([told['right'], told['wrong']]).startswith('1 of 2 right')
-
-
 def test_a_proof_from_end_to_end(tmp_path, capsys):
     out = tmp_path / 'proof'
     command = f'prove --n 1 --seed 4 --effect load_cell_gain --out {out}'
@@ -152,26 +127,20 @@ def test_a_proof_from_end_to_end(tmp_path, capsys):
     assert (out / 'rig_1' / 'report' / 'report.html').is_file()
 
 
-def test_what_cannot_be_concealed_is_named(capsys, tmp_path):
-    assert OFFERED == SIMULATORS
-    command = f'prove --form other --effect wire_creep --out {tmp_path / "proof"}'
-    assert main(command.split()) == 2
-    assert '--effect wire_creep: with --form other' in capsys.readouterr().err
-    assert not (tmp_path / 'proof').exists()
-
-
 def test_a_slave_has_both_joints_and_nothing_that_spoils_recordings(capsys, tmp_path):
     for number in range(1, 7):
         case, truth = drawn(SLAVE, 11, number)
         assert case.true.joint_names() == case.described.joint_names() == ('bend_x', 'bend_y')
         assert all(law.stage != 'recording' for law in case.laws)
         assert list(truth['joints']) == ['bend_x', 'bend_y']
-    command = f'prove --rig slave --effect clock_skew --out {tmp_path / "proof"}'
-    assert main(command.split()) == 2
-    assert '--effect clock_skew: with --form slave' in capsys.readouterr().err
-    command = f'prove --rig slave --form other --out {tmp_path / "proof"}'
-    assert main(command.split()) == 2
-    assert 'mutually exclusive' in capsys.readouterr().err
+    for words, said in (
+        ('--rig slave --effect clock_skew', '--effect clock_skew: with --form slave'),
+        ('--rig slave --form other', 'mutually exclusive'),
+        ('--form other --effect wire_creep', '--effect wire_creep: with --form other'),
+    ):
+        assert main(['prove', *words.split(), '--out', str(tmp_path / 'proof')]) == 2
+        assert said in capsys.readouterr().err
+    assert not (tmp_path / 'proof').exists()
 
 
 @pytest.mark.nightly

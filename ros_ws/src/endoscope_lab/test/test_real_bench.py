@@ -1,20 +1,15 @@
 """Real recordings as `explain` takes them; skipped where they are not at hand."""
 
-import math
-
 import numpy as np
 import pytest
 from outside_data import REAL, needs
 
-from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics.simulator import simulate
 from endoscope_core.rig import shipped_rig
 from endoscope_lab.papers.real_recordings import recordings_folder
-from endoscope_lab.real.alone import Withheld
-from endoscope_lab.real.pieces import TakenOut, late_cells
+from endoscope_lab.real.pieces import late_cells
 from endoscope_lab.real.rig import PLANT, Plant, Told, as_described, wide
-from endoscope_lab.real.tables import rmse_rows, thorough_sections
-from endoscope_lab.real.takes import KGF, Take, between_cycles, read, require_recordings
+from endoscope_lab.real.takes import KGF, Take, between_cycles, read
 
 FOLDER = recordings_folder()
 recorded = needs(REAL)
@@ -65,19 +60,6 @@ def test_cycles_of_one_motion_are_alike_and_others_are_not_compared(simulated):
     assert np.isnan(between_cycles(other)).all()
 
 
-def test_a_row_says_what_each_plant_leaves(simulated):
-    model = wide(simulated.observation())
-    plants = dict.fromkeys(('nominal', 'refitted', 'augmented'), Plant(model, as_described(model)))
-    [row] = rmse_rows([Told(simulated, 0.0, plants)])
-    assert row[0] == 'simulated'
-    assert row[1].startswith('0.0')
-
-
-def test_a_folder_without_recordings_is_refused_by_name(tmp_path):
-    with pytest.raises(EndoscopeError, match=r'lacks 0\.txt'):
-        require_recordings(tmp_path)
-
-
 @recorded
 def test_recordings_have_real_time_and_units():
     tube, state, sent = (read(FOLDER / f'{n}.txt') for n in ('0', 'conf0_60', 'ff'))
@@ -89,20 +71,6 @@ def test_recordings_have_real_time_and_units():
     assert state.time[-1] - state.time[standing] == pytest.approx(3.06, abs=0.05)
     assert np.rad2deg(sent.command.max()) == pytest.approx(70.1, abs=0.1)
     assert sent.tension is None
-
-
-def test_a_piece_counts_as_named_where_it_comes_first():
-    found = [
-        TakenOut('wire_stretch', '0', 900.0, ('wire_stretch',), (3520.0, 3560.0)),
-        TakenOut('wire_stretch', '60', 800.0, ('contact', 'wire_stretch'), (3300.0, 3400.0)),
-        TakenOut('bending_friction', '0', 3.0, (), (math.nan, 1e-3)),
-    ]
-    *_, (title, words, header, rows, _) = thorough_sections([], Withheld((), (), ()), [], found)
-    assert title == 'Pieces taken out'
-    assert 'Named first: 1 of 3.' in words
-    assert header[:3] == ('piece', '0', '60')
-    assert rows[0] == ('wire_stretch', '3520, 3560 (900)', '3300, 3400, after contact (800)')
-    assert rows[1] == ('bending_friction', 'nothing (3)')
 
 
 @recorded

@@ -4,11 +4,7 @@ from outside_data import REAL, needs
 
 from endoscope_core.hysteresis.inverse import MODELS
 from endoscope_core.identification import Recording
-from endoscope_lab.papers.real_recordings import (
-    hysteresis_model,
-    left_of_the_rest,
-    real_recordings,
-)
+from endoscope_lab.papers.real_recordings import hysteresis_model, left_of_the_rest, real_recordings
 from endoscope_lab.real.prandtl_ishlinskii import fitted
 
 RECORDINGS = real_recordings()

@@ -7,7 +7,7 @@ import pytest
 from endoscope_bringup.cli import main
 from endoscope_core.errors import EndoscopeError
 from endoscope_lab.bench import keep_row
-from endoscope_lab.concealed.row import differences, rows_of
+from endoscope_lab.concealed.row import rows_of
 from endoscope_lab.concealed.trial import failed
 
 ROW = replace(
@@ -43,17 +43,6 @@ def test_a_line_that_was_cut_is_named(record):
     record.write_text(record.read_text() + '{"stratum": "nul')
     with pytest.raises(EndoscopeError, match=r'rows\.jsonl, line 2: no row of a case'):
         rows_of(record)
-
-
-def test_what_differs_is_said():
-    assert not list(differences(ROW, replace(ROW, augmented=1.06, seconds=3.0)))
-    other = replace(ROW, verdict='consistent', said=(), augmented=1.2, held=14)
-    assert list(differences(ROW, other)) == [
-        'verdict missing_physics -> consistent',
-        'said gravity@bend_x -> nothing',
-        'second recording, augmented: 1.05 -> 1.2',
-        'intervals that hold: 15 of 16 -> 14 of 16',
-    ]
 
 
 @pytest.mark.nightly

@@ -4,133 +4,14 @@ import re
 import numpy as np
 import pytest
 from outside_data import CASES, needs
-from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
 
-from endoscope_lab.concealed.sliding_nodes import (
-    NOMINAL,
-    follow,
-    motor_angle,
-    move_wire,
-    simulate,
-)
+from endoscope_lab.concealed.sliding_nodes import NOMINAL, follow, move_wire, simulate
 
 REFERENCE = CASES / 'sheath' / 'reference'
 
-CELLS = 100
-PLACE = np.linspace(0.0, 1.0, CELLS + 1)
 EXPONENT = 0.9
 STIFFNESS = 3000.0
-EVEN = {**NOMINAL, 'pretension_profile': 0.0}
-
-
-def pulled(plant, *motor, joint=None, cells=CELLS):
-    """Tension along a wire at the last of the motor's displacements."""
-    motor = np.array(motor)
-    return move_wire(plant, motor, np.zeros(len(motor)) if joint is None else joint, cells)[-1]
-
-
-def displacement(phi):
-    """How far an even wire's end is pulled when friction has turned over `phi` of exponent."""
-    return 5.0 / (STIFFNESS * EXPONENT) * (math.exp(phi) - 1.0 - phi)
-
-
-def test_a_pulled_wire_slides_up_to_where_its_tension_has_fallen_to_the_old_one():
-    tension = pulled(EVEN, 0.0, displacement(0.6))
-    assert tension[0] == pytest.approx(5.0 * math.exp(0.6), abs=1e-3)
-    expected = np.maximum(tension[0] * np.exp(-EXPONENT * PLACE), 5.0)
-    np.testing.assert_allclose(tension, expected, atol=0.03)
-    np.testing.assert_allclose(tension[expected > 5.1], expected[expected > 5.1], rtol=1e-9)
-    np.testing.assert_allclose(tension[PLACE > 0.7], 5.0, rtol=1e-12)
-
-
-def test_a_released_wire_slides_back_over_half_the_change():
-    before = pulled(EVEN, 0.0, displacement(0.6))
-    back = before[0] * (1.0 - math.exp(-0.2)) ** 2 / (STIFFNESS * EXPONENT)
-    tension = pulled(EVEN, 0.0, displacement(0.6), displacement(0.6) - back)
-    assert tension[0] == pytest.approx(before[0] * math.exp(-0.4), abs=3e-3)
-    np.testing.assert_allclose(
-        tension, np.minimum(before, tension[0] * np.exp(EXPONENT * PLACE)), atol=0.06
-    )
-    np.testing.assert_allclose(tension[PLACE > 0.25], before[PLACE > 0.25], rtol=1e-12)
-
-
-@pytest.mark.parametrize('steps', [1, 7])
-def test_a_wire_comes_back_to_where_it_turned(steps):
-    out, back = 0.4e-3, 0.15e-3
-    way = np.concatenate(
-        [
-            [0.0],
-            np.linspace(out, out - back, steps + 1),
-            np.linspace(out - back, out, steps + 1)[1:],
-        ]
-    )
-    along = move_wire(NOMINAL, way, np.zeros(len(way)), CELLS)
-    assert abs(along[1 + steps, 0] - along[1, 0]) > 1.0
-    np.testing.assert_allclose(along[-1], along[1], atol=1e-8)
-    # Beyond the turn it goes on as if it had never turned.
-    np.testing.assert_allclose(
-        pulled(NOMINAL, *way, 0.6e-3), pulled(NOMINAL, 0.0, out, 0.6e-3), atol=1e-8
-    )
-
-
-def test_a_wire_without_friction_is_a_spring():
-    smooth = {**NOMINAL, 'capstan_exponent': 1e-9}
-    tension = pulled(smooth, 0.0, 0.2e-3, joint=np.array([0.0, -0.1e-3]))
-    np.testing.assert_allclose(tension, 5.0 + STIFFNESS * 0.3e-3, atol=1e-6)
-
-
-@pytest.mark.parametrize('direction', [1.0, -1.0])
-def test_a_wire_that_slides_as_a_whole_holds_the_capstan_s_ratio(direction):
-    way = direction * np.array([0.0, 3e-3])
-    tension = pulled(EVEN, *way, joint=way)
-    np.testing.assert_allclose(
-        tension, tension[0] * np.exp(-direction * EXPONENT * PLACE), rtol=1e-9
-    )
-    # Moved as a whole, it is as long as it was.
-    assert np.trapezoid(tension, PLACE) == pytest.approx(5.0, abs=1e-9)
-
-
-def test_a_wire_pulled_at_both_ends_keeps_a_still_point():
-    way = np.array([0.0, 2e-3])
-    tension = pulled(EVEN, *way, joint=-way)
-    np.testing.assert_allclose(tension, tension[::-1], rtol=1e-9)
-    from_middle = np.abs(PLACE - 0.5) - 0.5
-    np.testing.assert_allclose(tension, tension[0] * np.exp(EXPONENT * from_middle), rtol=1e-9)
-    assert np.trapezoid(tension, PLACE) == pytest.approx(5.0 + STIFFNESS * 4e-3, abs=1e-8)
-
-
-def test_a_slack_wire_picks_up_by_its_length():
-    spare = 5.0 / STIFFNESS
-    motor = np.array([0.0, -spare - 1e-3, -spare - 1e-3, -spare - 0.6e-3, -spare])
-    joint = np.array([0.0, 0.0, -0.4e-3, -0.4e-3, -0.4e-3])
-    along = move_wire(EVEN, motor, joint, CELLS)
-    assert np.all(along[1:4] == 0.0)
-    # From no tension at all the pulled end's front reaches the other end at once.
-    expected = 0.4e-3 * STIFFNESS * EXPONENT / (1.0 - math.exp(-EXPONENT))
-    np.testing.assert_allclose(along[4], expected * np.exp(-EXPONENT * PLACE), rtol=1e-4)
-    # Whether the pick-up falls on a step or into one is all the same.
-    inside = move_wire(EVEN, motor[[0, 1, 2, 4]], joint[[0, 1, 2, 4]], CELLS)
-    np.testing.assert_allclose(inside[-1], along[-1], atol=1e-9)
-
-
-def test_uneven_friction():
-    uneven = {**NOMINAL, 'friction_profile': (1.0, -0.5), 'pretension_profile': 1.0}
-
-    def density(s):
-        return math.exp(math.cos(math.pi * s) - 0.5 * math.cos(2.0 * math.pi * s))
-
-    share = quad(density, 0.0, 0.3)[0] / quad(density, 0.0, 1.0)[0]
-    tension = pulled(uneven, 0.0, 0.0)
-    assert tension[30] == pytest.approx(5.0 * math.exp(-EXPONENT * share), rel=1e-6)
-    assert tension[-1] == pytest.approx(5.0 * math.exp(-EXPONENT), rel=1e-12)
-    way = np.array([0.0, 0.3e-3, 0.1e-3])
-    mirrored = {**EVEN, 'friction_profile': (-1.0, -0.5)}
-    np.testing.assert_allclose(
-        pulled({**uneven, **EVEN, 'friction_profile': (1.0, -0.5)}, *way),
-        pulled(mirrored, *(0.0 * way), joint=-way)[::-1],
-        atol=1e-8,
-    )
 
 
 def steepest_first(tension, springs, ratio):
@@ -166,48 +47,6 @@ def test_the_nodes_end_where_the_steepest_pair_first_would_leave_them(in_turn, a
         tension = steepest_first(tension, springs, math.exp(EXPONENT / cells))
         np.testing.assert_allclose(along[k], tension, rtol=0.0, atol=allowed)
     assert np.ptp(along[:, -1]) > 1.0
-
-
-def test_the_servo_s_response_to_a_step():
-    time = np.arange(200) * 1e-3
-    damped = 30.0 * math.sqrt(1.0 - 0.9**2)
-    rest = np.exp(-27.0 * time) * (np.cos(damped * time) + 27.0 / damped * np.sin(damped * time))
-    np.testing.assert_allclose(
-        motor_angle(NOMINAL, np.full(200, 0.3), 1e-3), 0.3 * (1.0 - rest), atol=1e-12
-    )
-
-
-@pytest.mark.parametrize('spread', [0.0, 0.8])
-def test_the_joint_comes_to_rest_where_its_torques_balance(spread):
-    plant = {**NOMINAL, 'joint_presliding_spread': spread, 'joint_rest_angle': 0.02}
-    shaft = 0.4 * np.clip(np.arange(700) / 500.0, 0.0, 1.0)
-    at_motor, at_joint, angle = follow(plant, shaft, 1e-3, 20)
-    # The rest angle pulls the joint the same way, so it never turns back.
-    assert np.all(np.diff(angle) > -1e-9)
-    assert angle[-1] > 0.05
-    widths = 0.03 * np.exp([-spread, 0.0, spread])
-    friction = 9e-4 * np.mean(1.0 - np.exp(-angle[-1] / widths))
-    torque = 0.0008 * (at_joint[-1, 0] - at_joint[-1, 1])
-    assert torque == pytest.approx(0.0045 * (angle[-1] - 0.02) + friction, abs=1e-8)
-    assert at_motor[-1, 0] > at_joint[-1, 0]
-
-
-def test_without_friction_the_joint_is_a_spring_between_springs():
-    plant = {**NOMINAL, 'capstan_exponent': 1e-9, 'joint_friction': 0.0}
-    shaft = np.concatenate([[0.0], np.full(300, 0.3)])
-    *_, angle = follow(plant, shaft, 1e-3, 10)
-    pull, bend = 2.0 * 3000.0 * 0.0008 * 0.0024, 0.0045 + 2.0 * 3000.0 * 0.0008**2
-    assert angle[-1] == pytest.approx(pull * 0.3 / bend, abs=1e-8)
-
-
-def test_the_two_wires_are_each_other_s_mirror():
-    command = 0.7 * np.sin(np.arange(400) * 0.02)
-    shaft, at_motor, at_joint, angle = simulate(NOMINAL, command, 1e-3, 20)
-    turned = simulate(NOMINAL, -command, 1e-3, 20)
-    for own, other in zip(
-        (-shaft, at_motor[:, ::-1], at_joint[:, ::-1], -angle), turned, strict=True
-    ):
-        np.testing.assert_allclose(own, other, atol=1e-7)
 
 
 def at_hinges(mu, bend, sense):

@@ -33,13 +33,6 @@ def test_on_the_simulated_rig_much_friction_makes_it_narrower():
     assert np.all(np.diff(widths) < 0.0)
 
 
-def test_leaving_a_point_out_predicts_it_from_the_others():
-    np.testing.assert_allclose(
-        leave_one_out_errors([0.0, 1.0, 2.0, 3.0], [1.0, 3.0, 5.0, 7.0]), 0.0, atol=1e-12
-    )
-    assert leave_one_out_errors([0.0, 1.0, 2.0], [0.0, 1.0, 5.0])[2] == pytest.approx(-3.0)
-
-
 @needs(REAL)
 def test_real_backlash_sizes_from_tension_alone():
     sizes, widths = [], []

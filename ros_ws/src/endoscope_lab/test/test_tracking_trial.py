@@ -72,8 +72,7 @@ def test_a_tube_that_is_bent_almost_twice_as_much_as_thought_is_learnt_within_a_
 
 def test_physics_that_the_model_lacks_does_not_lead_the_learning_astray():
     heavy = PlantDescription(
-        joints={'bend_x': JOINT},
-        effects=(EffectSpec('gravity', 'bend_x', {'moment_nm': 0.001}),),
+        joints={'bend_x': JOINT}, effects=(EffectSpec('gravity', 'bend_x', {'moment_nm': 0.001}),)
     )
     signal = periodic_signal(3.2 * np.pi).scaled(0.8)
     known = (PhysicalParameters(JOINT),)

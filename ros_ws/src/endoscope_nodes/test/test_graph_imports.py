@@ -7,7 +7,7 @@ NOT_FOR_NODES = {'torch', 'matplotlib', 'endoscope_explain'}
 NOT_FOR_NODES |= {'scipy.signal', 'scipy.stats'}
 
 
-def test_the_graph_loads_nothing_that_only_training_and_reports_need() -> None:
+def test_the_graph_loads_nothing_that_only_training_and_reports_need():
     program = (
         'import sys\n'
         'import endoscope_nodes.graph\n'

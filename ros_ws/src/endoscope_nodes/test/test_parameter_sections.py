@@ -67,10 +67,6 @@ def test_a_parameter_twice_is_refused(check):
         check('/**/recorder:\n  ros__parameters:\n    bag: a\n    bag: b\n')
 
 
-def test_an_empty_file_is_for_nobody(check):
-    assert check('') == []
-
-
 def test_a_rule_for_one_node_is_for_it_in_any_namespace():
     args = ['--ros-args', '-p', 'recorder:bag:=a:b:=c', '-p', 'watch:active:=true', '-p', 'keep:=1']
     assert given_to_nodes(args) == {'recorder': {'bag': 'a:b:=c'}, 'watch': {'active': True}}

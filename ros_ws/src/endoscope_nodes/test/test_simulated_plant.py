@@ -48,10 +48,7 @@ def test_a_process_has_the_plant_and_seed_of_its_rig_file_unless_told_otherwise(
     rig = tmp_path / 'rig.yaml'
     rig.write_text('simulation: {plant: own.yaml, seed: 7}')
     other = saved(tmp_path, 'other.yaml', 0.6)
-    for more, exponent, seed in (
-        ({}, 0.3, 8),
-        ({'plant_file': str(other), 'seed': 0}, 0.6, 1),
-    ):
+    for more, exponent, seed in (({}, 0.3, 8), ({'plant_file': str(other), 'seed': 0}, 0.6, 1)):
         overrides = {'motor_driver': {'rig_file': str(rig), **more}}
         args = ['--ros-args', '-p', 'use_sim_time:=true', '--log-level', 'fatal']
         with Runtime(args, Context(), 77, overrides) as runtime:
@@ -70,13 +67,3 @@ def test_a_file_is_named_by_its_whole_path_for_programs_in_other_folders(tmp_pat
         node = runtime.add(MotorDriverNode)
         assert node.get_parameter('plant_file').value == str(plant)
         assert node.get_parameter('rig_file').value == str(tmp_path / 'rig.yaml')
-
-
-def test_a_device_that_the_rig_file_names_is_looked_for(tmp_path):
-    rig = tmp_path / 'rig.yaml'
-    rig.write_text('devices: {motors: dynamixel}')
-    with (
-        Runtime(['--ros-args', '-p', f'rig_file:={rig}'], Context(), 77) as runtime,
-        pytest.raises(ParameterError, match='/dev/ttyUSB0: there is no such port'),
-    ):
-        runtime.add(MotorDriverNode)

@@ -3,7 +3,6 @@
 import re
 import sys
 from importlib import import_module
-from pathlib import Path
 
 import pytest
 from jinja2 import TemplateNotFound, UndefinedError
@@ -20,7 +19,7 @@ TEMPLATE = """{% extends 'page.html.j2' %}
 
 
 @pytest.fixture
-def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+def package(tmp_path, monkeypatch):
     """A package with a template of its own."""
     name = 'package_with_a_page'
     (tmp_path / name / 'templates').mkdir(parents=True)
@@ -32,11 +31,11 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     del sys.modules[name]
 
 
-def rendered(package: str, **values: object) -> str:
+def rendered(package, **values):
     return render_page(package, 'templates/own.html.j2', filters={'loud': str.upper}, **values)
 
 
-def test_a_template_fills_the_layout_and_what_it_shows_is_escaped(package: str) -> None:
+def test_a_template_fills_the_layout_and_what_it_shows_is_escaped(package):
     page = rendered(package, name='a < b', table=html_table(['c'], [['<i>']]))
     assert '<title>a &lt; b</title>' in page
     assert '<p>A &lt; B</p>' in page
@@ -45,21 +44,21 @@ def test_a_template_fills_the_layout_and_what_it_shows_is_escaped(package: str) 
     assert body.index('</table>') < body.index('<script>') < body.index('</html>')
 
 
-def test_a_page_needs_no_other_file(package: str) -> None:
+def test_a_page_needs_no_other_file(package):
     page = rendered(package, name='alone', table='')
     assert re.findall(r'(?:src|href)\s*=\s*["\']([^"\']+)', page) == ['data:,']
     assert '--curve-1' in page
     assert 'uPlot' in page
 
 
-def test_what_a_template_lacks_is_named(package: str) -> None:
+def test_what_a_template_lacks_is_named(package):
     with pytest.raises(UndefinedError, match='name'):
         rendered(package, table='')
     with pytest.raises(TemplateNotFound, match='absent'):
         render_page(package, 'templates/absent.html.j2')
 
 
-def test_columns_of_words_are_on_the_left() -> None:
+def test_columns_of_words_are_on_the_left():
     table = html_table(['effect', 'unit', 'value'], [['slack', 'mm', 0.5]], words=2)
     assert re.findall(r'<(t[hd])( class="l")?>(.*?)</\1>', table) == [
         *[('th', ' class="l"', 'effect'), ('th', ' class="l"', 'unit'), ('th', '', 'value')],

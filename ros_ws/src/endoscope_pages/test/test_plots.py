@@ -22,13 +22,13 @@ RNG = np.random.default_rng(1)
 LONG = 1e-3 * np.arange(50_000)
 
 
-def data_of(page: str) -> dict:
+def data_of(page):
     (text,) = re.findall(r'class="plot-data">(.*?)</script>', page, flags=re.DOTALL)
     return json.loads(text)
 
 
 @given(st.integers(MOST_BINS + 2, 5 * MOST_BINS), st.integers(0, 2**32 - 1))
-def test_every_reading_lies_in_its_band(count: int, seed: int) -> None:
+def test_every_reading_lies_in_its_band(count, seed):
     rng = np.random.default_rng(seed)
     time = np.cumsum(rng.uniform(0.5, 1.5, count))
     values = rng.standard_normal(count)
@@ -42,14 +42,7 @@ def test_every_reading_lies_in_its_band(count: int, seed: int) -> None:
     assert np.all(values[known] <= high[place][known])
 
 
-def test_bands_of_neighbours_touch() -> None:
-    """So that a steep line is not drawn as loose dashes."""
-    edges, low, high = banded(LONG, LONG**3)
-    assert np.all(low[1:] <= high[:-1])
-    assert len(edges) == len(low) + 1
-
-
-def test_a_stretch_without_readings_is_a_gap() -> None:
+def test_a_stretch_without_readings_is_a_gap():
     values = np.ones_like(LONG)
     values[10_000:20_000] = np.nan
     _, low, high = banded(LONG, values)
@@ -57,7 +50,7 @@ def test_a_stretch_without_readings_is_a_gap() -> None:
     assert np.nanmin(low) == np.nanmax(high) == 1.0
 
 
-def test_a_loop_keeps_its_extremes_and_its_order() -> None:
+def test_a_loop_keeps_its_extremes_and_its_order():
     x, y = np.sin(LONG), np.cos(LONG) + 0.01 * RNG.standard_normal(len(LONG))
     kept = decimated(x, y)
     assert len(kept) <= MOST_READINGS
@@ -67,7 +60,7 @@ def test_a_loop_keeps_its_extremes_and_its_order() -> None:
         assert values[kept].max() == values.max()
 
 
-def test_short_curves_are_drawn_reading_by_reading_and_long_ones_as_bands() -> None:
+def test_short_curves_are_drawn_reading_by_reading_and_long_ones_as_bands():
     few, many = LONG[:MOST_READINGS], LONG
     curves = (Curve('few', few, np.sin(few)), Curve('many', many, np.sin(many)))
     data = data_of(figure_html([Plot('both', 'time (s)', curves)]))
@@ -77,13 +70,13 @@ def test_short_curves_are_drawn_reading_by_reading_and_long_ones_as_bands() -> N
     assert len(data['x'][drawn_many['x']]) == len(drawn_many['low']) + 1
 
 
-def test_positions_that_curves_share_are_in_the_page_once() -> None:
+def test_positions_that_curves_share_are_in_the_page_once():
     curves = tuple(Curve(name, LONG[:100], LONG[:100] + k) for k, name in enumerate('abc'))
     data = data_of(figure_html([Plot('plot', 'time (s)', curves)] * 2))
     assert len(data['x']) == 1
 
 
-def test_gaps_are_null_and_the_range_is_of_what_is_known() -> None:
+def test_gaps_are_null_and_the_range_is_of_what_is_known():
     curve = Curve('a', LONG[:4], np.array([1.0, np.nan, 3.0, np.inf]))
     (plot,) = data_of(figure_html([Plot('plot', 'time (s)', (curve,))]))['plots']
     assert plot['curves'][0]['y'] == [1.0, None, 3.0, None]
@@ -91,16 +84,7 @@ def test_gaps_are_null_and_the_range_is_of_what_is_known() -> None:
     assert 3.0 < plot['range_y'][1] < 3.2
 
 
-def test_the_lowest_plot_of_a_column_has_the_label() -> None:
-    def plot(columns: int, across: str = 'time (s)') -> Plot:
-        return Plot('plot', across, (Curve('a', LONG[:3], LONG[:3]),), columns=columns)
-
-    plots = [plot(12, 'command (deg)'), plot(7), plot(5), plot(7), plot(5)]
-    labelled = [p['labelled'] for p in data_of(figure_html(plots))['plots']]
-    assert labelled == [True, False, False, True, True]
-
-
-def test_no_label_ends_the_page_early() -> None:
+def test_no_label_ends_the_page_early():
     name = '</script><b>&'
     page = figure_html([Plot(name, name, (Curve(name, LONG[:3], LONG[:3]),))], name)
     assert '<b>' not in page
@@ -108,7 +92,7 @@ def test_no_label_ends_the_page_early() -> None:
     assert data_of(page)['plots'][0]['x_label'] == name
 
 
-def test_the_table_has_the_numbers_of_every_curve() -> None:
+def test_the_table_has_the_numbers_of_every_curve():
     curve = Curve('a', LONG[:4], np.array([1.0, np.nan, 3.0, -2.0]))
     table = figure_html([Plot('plot', 'time (s)', (curve,))])
     cells = re.findall(r'<td>(.*?)</td>', table)
@@ -127,6 +111,6 @@ def test_the_table_has_the_numbers_of_every_curve() -> None:
         ),
     ],
 )
-def test_curves_that_cannot_be_drawn_are_named(make, named: str) -> None:
+def test_curves_that_cannot_be_drawn_are_named(make, named):
     with pytest.raises(ValueError, match=named):
         make()

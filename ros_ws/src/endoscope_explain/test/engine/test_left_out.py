@@ -49,8 +49,7 @@ def tubes(one_joint):
         rig = one_joint.rig(capstan_exponent=exponent, section_friction=0.4)
         rig = replace(rig, effects=(wall,) if seed == 1 else ())
         described = replace(
-            plant,
-            joints={'bend_x': replace(plant.joints['bend_x'], capstan_exponent=exponent)},
+            plant, joints={'bend_x': replace(plant.joints['bend_x'], capstan_exponent=exponent)}
         )
         recording = one_joint.record(rig, one_joint.motion(6.0), seed)
         seen = tuple(each.coarser(5) for each in observe(recording, described))

@@ -6,14 +6,7 @@ import pytest
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.layout import IN_COMMAND
 from endoscope_explain.observe.observation import observe
-from endoscope_explain.observe.revisits import (
-    GAP_S,
-    LEAST_SHARE,
-    held_out,
-    motion_repeats,
-    seen_before,
-    strokes,
-)
+from endoscope_explain.observe.revisits import GAP_S, held_out, motion_repeats, seen_before, strokes
 
 TIME = 1e-3 * np.arange(40_000)
 CYCLE = 2.0 * np.pi
@@ -40,17 +33,6 @@ def test_a_rise_from_another_turn_is_another_branch():
     seen = seen_before(np.sin(TIME[:12566]))
     assert not seen[: round(1.2 * CYCLE / 0.02)].any()
     assert seen[round(1.3 * CYCLE / 0.02) :].mean() > 0.9
-
-
-def test_one_cycle_is_too_little_and_the_calibration_is_enough():
-    one, calibration = np.sin(TIME[:6300]), np.sin(TIME[:9000])
-    assert np.mean(seen_before(one)) < LEAST_SHARE < np.mean(seen_before(calibration))
-
-
-def test_the_share_does_not_depend_on_the_tick():
-    command = np.sin(TIME[:9000])
-    coarse = np.mean(seen_before(command[::5], 5e-3))
-    assert coarse == pytest.approx(np.mean(seen_before(command)), abs=0.02)
 
 
 def observation(one_joint, command):

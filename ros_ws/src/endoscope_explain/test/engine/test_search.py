@@ -22,13 +22,7 @@ from endoscope_explain.search.levels import Level, search
 from endoscope_explain.search.null_rigs import Null
 from endoscope_explain.search.refit import Candidate, candidate
 from endoscope_explain.search.screen import background, directions, gains, screened
-from endoscope_explain.search.term import (
-    LAGS,
-    Term,
-    effects,
-    functions,
-    starting_points,
-)
+from endoscope_explain.search.term import LAGS, Term, effects, functions, starting_points
 
 
 @pytest.fixture

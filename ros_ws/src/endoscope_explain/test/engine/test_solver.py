@@ -88,18 +88,6 @@ def test_why_it_went_no_further_is_told():
     assert (still.ended, still.steps) == (Ended.NO_STEP, 1)
 
 
-def test_a_known_derivative_and_its_updates_save_derivatives():
-    start = np.array([0.5, 0.2, 0.0])
-    always, seldom = curve(decay, 3), curve(decay, 3)
-    minimise(always, start, Effort(30, 1e-6, renewal=Renewal.ALWAYS))
-    residuals, _ = seldom.evaluate(start)
-    known = seldom.derivative(start, residuals, 1e-4)
-    before = known.copy()
-    minimise(seldom, start, Effort(30, 1e-6), known)
-    assert seldom.derivatives < always.derivatives
-    assert np.array_equal(known, before)
-
-
 def test_without_renewal_every_step_costs_one_evaluation():
     problem = curve(decay, 3)
     start = np.array([1.5, 1.0, 0.2])
@@ -120,12 +108,6 @@ def test_a_longer_stride_looks_over_what_is_rough():
     both = minimise(curve(rough, 1), start, Effort(40, 1e-6, (1e-4, 0.5), Renewal.ALWAYS))
     assert both.cost < 0.1 * fine.cost
     assert abs(both.theta[0]) < 0.1
-
-
-def test_nothing_is_stepped_over_where_the_start_is_the_end():
-    found = minimise(curve(decay, 3), np.array([2.0, 1.3, 0.4]), Effort())
-    assert found.theta == pytest.approx([2.0, 1.3, 0.4])
-    assert found.cost == pytest.approx(0.0, abs=1e-20)
 
 
 def test_updates_kept_apart_are_those_of_the_whole_derivative():
