@@ -11,7 +11,6 @@ import time
 import ndicapy
 import numpy as np
 import pytest
-from aurora_rig import angle_between
 from device_readings import until
 from sksurgerynditracker.nditracker import NDITracker
 
@@ -103,9 +102,3 @@ def test_scikit_surgery_tracks_it(port):
     np.testing.assert_allclose(poses[0][0][:4], quaternion, atol=1e-6)
     np.testing.assert_allclose(poses[0][0][4:], position, atol=1e-3)
     assert quality[0] == pytest.approx(0.3)
-
-
-def test_the_sensor_may_be_mounted_at_any_angle():
-    straight = InstrumentInField(lambda _: (0.0, 0.0))(0.0)
-    turned = InstrumentInField(lambda _: (0.0, 0.0), roll=1.2)(0.0)
-    assert angle_between(straight.orientation, turned.orientation) == pytest.approx(1.2)

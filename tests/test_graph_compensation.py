@@ -6,7 +6,6 @@ from simulated_graph import TICK_RATE, SimulatedGraph
 from tubes import tube_of_size
 
 from endoscope_core.control import MODES
-from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.metrics import tracking_rmse
 from endoscope_core.signals import periodic_signal
 from endoscope_core.signals.command_file import write_command_file
@@ -99,12 +98,3 @@ def test_every_mode_comes_in_while_moving_without_a_jump(tmp_path):
             assert len(drives) == 0.4 * TICK_RATE
             largest = steps[before - 2 : before + TICK_RATE // 20].max()
             assert largest <= 2.0 * steps[: before - 2].max(), node
-
-
-def test_what_the_calibration_did_not_find_is_not_guessed():
-    with SimulatedGraph() as graph:
-        graph.enable()
-        graph.nodes['compensator'].findings = CalibrationFindings(70)
-        graph.set('compensator', mode='physical', selected_by='plant')
-        graph.advance(0.3)
-        assert graph.nodes['compensator']._feedforward.law.mode == 'none'

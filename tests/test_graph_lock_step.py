@@ -25,15 +25,17 @@ STREAMS = {
 
 
 def calibration(clock):
-    """Result but for its time, and what was commanded and read in it and in a motion."""
+    """Result but for its time, and what was commanded and read in a motion before it and in it."""
     overrides = {'calibration': {'motion': 'brief'}, 'simulation_clock': clock}
     with SimulatedGraph(overrides=overrides) as graph:
         streams = {topic: graph.listen(topic, names) for topic, names in STREAMS.items()}
         graph.enable()
-        result = graph.calibrate()
         graph.set('master', source='motion', motion='non_periodic')
         graph.advance(1.0)
-    end = streams['slave/servo_jp'][-1].stamp_ns
+        graph.set('master', source='none')
+        graph.advance(0.5)
+        result = graph.calibrate()
+    end = streams['calibration/servo_jp'][-1].stamp_ns
     heard = {topic: [s for s in stream if s.stamp_ns <= end] for topic, stream in streams.items()}
     return {key: value for key, value in result.items() if 'duration' not in key}, heard
 

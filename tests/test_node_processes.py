@@ -128,11 +128,3 @@ def test_the_whole_graph_in_motion_stops_cleanly(operator, rig, tmp_path):
         process.kill()
         process.communicate()
     assert (bag / 'metadata.yaml').is_file()
-
-
-def test_a_wrong_parameter_is_one_line_and_exit_code_2():
-    process = start('calibration', '-p', f'weights:={__file__}')
-    _, errors = process.communicate(timeout=PATIENCE_S)
-    assert process.returncode == 2
-    [line] = errors.splitlines()
-    assert "calibration: parameter 'weights': " in line
