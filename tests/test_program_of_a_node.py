@@ -7,12 +7,15 @@ import signal
 import subprocess
 import sys
 import time
+from multiprocessing import active_children
 from pathlib import Path
+from random import Random
 
 import pytest
 from node_program import code_of
 
 from endoscope_core.atomic_output import atomic_directory
+from endoscope_lab.faults.process_rig import ProcessRig
 from endoscope_nodes import program
 from endoscope_nodes.node_help import help_of
 from endoscope_nodes.program import NODES, words_for_nobody
@@ -232,3 +235,16 @@ def healthcheck(node, environment):
         text=True,
         check=False,
     )
+
+
+@pytest.mark.nightly
+def test_each_node_is_a_process_and_all_in_motion_stop_cleanly(tmp_path):
+    with ProcessRig(100, False, tmp_path, Random(1)) as rig:
+        rig.begin('motion')
+        assert rig.enable_and_move() is not None
+        for k, (name, pid) in enumerate(zip(rig.names, rig.processes.pids, strict=True)):
+            os.kill(pid, STOPPING[k % 2])
+            [process] = [p for p in active_children() if p.pid == pid]
+            process.join(PATIENCE_S)
+            assert process.exitcode == 0, (tmp_path / f'{name}.log').read_text()
+            assert 'Traceback' not in (tmp_path / f'{name}.log').read_text()
