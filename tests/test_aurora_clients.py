@@ -47,7 +47,7 @@ def expected():
     return np.array((w, x, y, z)), 1e3 * np.array(view.position)
 
 
-def test_ndicapi_finds_and_tracks_it(port):
+def test_ndicapi_finds_and_tracks_it_also_where_it_was_left_tracking(port):
     device = found(port)
     try:
         for command in ('INIT:', 'COMM:50000', 'PINIT:0A', 'PENA:0AD', 'TSTART:'):
@@ -65,17 +65,13 @@ def test_ndicapi_finds_and_tracks_it(port):
             time.sleep(0.1)
             ndicapy.ndiCommand(device, mode)
             assert frame(device, b'\x0a') > first
-        assert ndicapy.ndiCommand(device, 'TSTOP:') == 'OKAY'
     finally:
         ndicapy.ndiClose(device)
-
-
-def test_ndicapi_finds_a_tracker_that_was_left_tracking_at_another_rate(port):
+    # It was left tracking, and at another rate.
     device = found(port)
-    for command in ('INIT:', 'COMM:50000', 'PINIT:0A', 'PENA:0AD', 'TSTART:'):
-        ndicapy.ndiCommand(device, command)
+    for command in ('INIT:', 'PINIT:0A', 'PENA:0AD', 'TSTART:', 'TSTOP:'):
+        assert ndicapy.ndiCommand(device, command) == 'OKAY'
     ndicapy.ndiClose(device)
-    ndicapy.ndiClose(found(port))
 
 
 def test_scikit_surgery_tracks_it(port):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from commanded_graph import BOUND, RIG, STILL, TICK_S, Handle, Moved, run, ticks
 from sensor_msgs.msg import JointState, Joy
-from simulated_graph import TICK_RATE
+from simulated_graph import TICK_RATE, SimulatedGraph
 
 from endoscope_nodes.names import CORRECTION, MOTOR_MEASURED, MOTORS, SLAVE_COMMAND
 from endoscope_nodes.runtime.diagnostics import OK, WARN
@@ -58,6 +58,15 @@ def test_over_tension_is_a_fault_that_latches():
         assert graph.state == 'FAULT'
         assert moved.goals == []
         assert graph.diagnostics['supervisor: operating state'][-1].level == b'\x02'
+
+
+def test_a_slave_whose_wires_are_too_tight_at_rest_is_not_enabled():
+    rig = dataclasses.replace(RIG, tension=dataclasses.replace(RIG.tension, ceiling=4.5))
+    with SimulatedGraph(rig=rig) as graph:
+        graph.advance(0.2)
+        assert graph.command('enable') != 'ENABLED'
+        causes = '; '.join(graph.nodes['supervisor'].machine.present_causes.values())
+        assert 'over the ceiling of 4.5 N' in causes
 
 
 def test_load_cells_unplugged_are_a_fault_that_torque_off_leaves_at_any_time():
