@@ -162,30 +162,6 @@ def test_a_line_that_is_never_silent_is_given_up(tmp_path):
             line.close()
 
 
-@pytest.mark.nightly
-def test_an_old_reply_that_no_wire_can_follow_is_left_out_and_counted(cable, on_serial, cells):
-    """RTU replies have no number: what tells them is how far the tension has gone on."""
-    kept, number = [], [0]
-
-    def replay(data):
-        number[0] += 1
-        if len(kept) < 20:
-            kept.append(data)
-        return [(0.0, kept[number[0] % 20] if number[0] % 150 == 0 else data)]
-
-    cable.to_host = replay
-    until(lambda: len(kept) == 20)
-    cells.tension = dict.fromkeys(WIRES, 60.0)
-    until(lambda: figure(on_serial, 'wire_x_pos: new levels') == 1)
-    on_serial.take()
-    before = figure(on_serial, 'wire_x_pos: spikes')
-    until(lambda: figure(on_serial, 'wire_x_pos: spikes') >= before + 4)
-    for reading in on_serial.take():
-        assert reading.tension == pytest.approx((60.0,) * 4, abs=0.0021)
-    assert figure(on_serial, 'wire_x_pos: new levels') == 1
-    assert figure(on_serial, 'wrong CRC') == 0
-
-
 def test_flipped_bits_and_doubled_replies_are_counted_and_no_number(cable, on_serial):
     collect(on_serial, 5)
     number = [0]
