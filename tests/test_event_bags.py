@@ -1,6 +1,7 @@
 """The recorder keeps what led to a fault or a mark, though nobody records."""
 
 import json
+import resource
 import time
 
 import numpy as np
@@ -153,7 +154,7 @@ def test_a_node_that_ends_finishes_what_it_writes(tmp_path):
     assert bag.topics[SERVO].message_count > 100
 
 
-def test_no_more_than_allowed_are_written_and_that_is_said(tmp_path):
+def test_no_more_than_allowed_or_than_the_disk_has_room_for_is_written_and_that_is_said(tmp_path):
     with WatchedSession(tmp_path, keep_bags=1) as session:
         session.fault(cause='')
         [path] = session.kept()
@@ -165,6 +166,21 @@ def test_no_more_than_allowed_are_written_and_that_is_said(tmp_path):
         assert 'has 1 bags of faults and marks already: read them' in session.said()[1]
         assert event_bags(tmp_path) == [path]
         path.rename(tmp_path / 'read')
+        session.serve(1.0)
+        soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, hard))
+        try:
+            session.fault()
+            [full] = session.kept()
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        level, message = session.said()
+        assert level == ERROR
+        assert 'File too large; recording ended there' in message
+        assert CAUSE in message
+        assert [e.reason for e in events_of(open_bag(full).metadata)] == [CAUSE]
+        # The next one has room again.
+        full.rename(tmp_path / 'full')
         session.fault()
         session.kept()
         assert session.said()[0] == OK

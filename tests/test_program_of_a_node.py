@@ -237,9 +237,9 @@ def healthcheck(node, environment):
     )
 
 
-@pytest.mark.nightly
-def test_each_node_is_a_process_and_all_in_motion_stop_cleanly(tmp_path):
-    with ProcessRig(100, False, tmp_path, Random(1)) as rig:
+@pytest.mark.parametrize('composed', [True, pytest.param(False, marks=pytest.mark.nightly)])
+def test_one_process_of_all_nodes_or_of_each_in_motion_stops_cleanly(tmp_path, composed):
+    with ProcessRig(100, composed, tmp_path, Random(1)) as rig:
         rig.begin('motion')
         assert rig.enable_and_move() is not None
         for k, (name, pid) in enumerate(zip(rig.names, rig.processes.pids, strict=True)):
@@ -248,3 +248,4 @@ def test_each_node_is_a_process_and_all_in_motion_stop_cleanly(tmp_path):
             process.join(PATIENCE_S)
             assert process.exitcode == 0, (tmp_path / f'{name}.log').read_text()
             assert 'Traceback' not in (tmp_path / f'{name}.log').read_text()
+    assert (rig.bag / 'metadata.yaml').is_file()
