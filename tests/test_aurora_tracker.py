@@ -87,6 +87,10 @@ def test_each_frame_comes_once_with_the_time_at_which_it_was_measured(tracker, e
     # Those between two connections are not counted.
     assert figure(tracker, 'lost frames') >= lost or figure(tracker, 'connections') > 1
     assert are_well_timed(emulator, tracker, readings)
+    # One that was not asked for is counted as lost.
+    before, delays = figure(tracker, 'lost frames'), iter([0.15])
+    emulator.tap = lambda data: [(next(delays, 0.0), data)]
+    until(lambda: figure(tracker, 'lost frames') >= before + 3)
 
 
 def test_what_it_cannot_see_is_no_reading_and_said_until_it_is_seen_again(

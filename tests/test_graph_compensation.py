@@ -6,6 +6,7 @@ from simulated_graph import TICK_RATE, SimulatedGraph
 from tubes import tube_of_size
 
 from endoscope_core.control import MODES
+from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.metrics import tracking_rmse
 from endoscope_core.signals import periodic_signal
 from endoscope_core.signals.command_file import write_command_file
@@ -98,3 +99,10 @@ def test_every_mode_comes_in_while_moving_without_a_jump(tmp_path):
             assert len(drives) == 0.4 * TICK_RATE
             largest = steps[before - 2 : before + TICK_RATE // 20].max()
             assert largest <= 2.0 * steps[: before - 2].max(), node
+        # What a calibration did not find is not guessed.
+        graph.set('master', source='none')
+        compensator = graph.nodes['compensator']
+        compensator.findings = CalibrationFindings(70)
+        graph.set('compensator', mode='physical', selected_by='plant')
+        graph.advance(0.6)
+        assert compensator._feedforward.law.mode == 'none'

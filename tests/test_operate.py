@@ -69,7 +69,7 @@ def test_whoever_interrupts_a_calibration_pauses_the_graph(graph, number):
     process.send_signal(number)
     status, _, errors = graph.finish(process)
     assert status == 128 + number
-    assert {'resting', 'moving'} & set(errors.splitlines()), 'it shows its progress'
+    assert {'returning to zero', 'resting'} & set(errors.splitlines()), 'it shows its progress'
     assert 'the graph is PAUSED' in errors
     assert graph.state == 'PAUSED'
     assert not graph.nodes['calibration'].active

@@ -188,6 +188,7 @@ def test_who_asks_for_help_gets_it_and_loads_neither_ros_nor_anything_that_compu
     [
         (['start'], "recorder: unknown argument 'start'; parameters go behind --ros-args"),
         (['--ros-args', '--log-levl', 'info'], "unknown ROS arguments '--log-levl', 'info'"),
+        (['--ros-args', '-p', 'keep:=-1.0'], "recorder: parameter 'keep' is -1.0"),
     ],
 )
 def test_words_that_nobody_would_hear_are_one_line_and_exit_code_2(tmp_path, args, words):
