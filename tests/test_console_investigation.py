@@ -42,7 +42,7 @@ def interrupted(folder, plant):
     """An investigation that was left once a rig as described had been commissioned."""
     log = begun(folder, plant)
     folder.mkdir()
-    write_short_bag(folder / 'bag_1', PlantDescription())
+    write_short_bag(folder / 'bag_1', PlantDescription(), duration=2.5)
     write_command_file(folder / 'motion_1.csv', np.array([0.0, 4.0]), 0.1 * np.eye(2))
     motion = Round(
         COMMISSIONING, 'bend_x and bend_y', '', 'motion_1.csv', 4.0, 50.0, 'bag_1', recorded=True
