@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
 import numpy as np
+import pytest
 from operated_graph import OperatedGraph
 from playwright.sync_api import Browser, Page, expect
 from simulated_graph import TICK_RATE
@@ -127,6 +128,26 @@ class BrowsedConsole:
             shows(page, 'state', re.compile('^(DISABLED|ENABLED|PAUSED|FAULT)$'))
             yield page
             assert complaints == []
+
+
+@pytest.fixture(scope='module')
+def running(tmp_path_factory):
+    with BrowsedConsole(tmp_path_factory.mktemp('browsed')) as console:
+        yield console
+
+
+@pytest.fixture
+def console(running):
+    """Nobody operates, and the slave is limp."""
+    running.ask(lambda graph: graph.command('disable'))
+    return running
+
+
+@pytest.fixture
+def page(console, browser):
+    """Without plots, which a busy machine draws too slowly for a hand to be trusted."""
+    with console.page(browser, viewport={'width': 1024, 'height': 768}) as page:
+        yield page
 
 
 def shows(page: Page, name: str, words) -> None:

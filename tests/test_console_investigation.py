@@ -1,5 +1,6 @@
-"""The rig is investigated from a page: motions are asked for, held by hand, a plant adopted."""
+"""From a page: recordings are explained, the rig is investigated, motions held, a plant adopted."""
 
+import json
 import time
 import urllib.request
 from dataclasses import replace
@@ -7,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from console_rig import PATIENCE_S, ConsoleRig, ready
-from short_bags import write_short_bag
+from short_bags import PLANT, write_short_bag
 
 from endoscope_bags import open_bag
+from endoscope_console.explanations import EXPERIMENT_FILE, REPORT_FILE
 from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.signals.command_file import write_command_file
 from endoscope_explain.investigation.log import COMMISSIONING, Round, Stop, begun
@@ -18,6 +20,10 @@ from endoscope_nodes.names import SLAVE_COMMAND
 pytestmark = pytest.mark.engine
 
 PLANT_NAME = 'described.yaml'
+FAR = 0.06
+AT = np.linspace(0.0, 2.0, 201)
+BENDING = np.column_stack([0.2 * np.sin(AT), np.zeros(AT.size)])
+"""An experiment of an earlier explanation."""
 
 
 @pytest.fixture(scope='module')
@@ -27,6 +33,7 @@ def running(tmp_path_factory):
     bags.mkdir()
     save_plant(PlantDescription(), bags / PLANT_NAME)
     interrupted(bags / 'interrupted', bags / PLANT_NAME)
+    explained_earlier(bags)
     with ConsoleRig(folder) as rig:
         yield rig
 
@@ -35,13 +42,26 @@ def interrupted(folder, plant):
     """An investigation that was left once a rig as described had been commissioned."""
     log = begun(folder, plant)
     folder.mkdir()
-    write_short_bag(folder / 'bag_1', PlantDescription())
+    write_short_bag(folder / 'bag_1', PlantDescription(), duration=2.5)
     write_command_file(folder / 'motion_1.csv', np.array([0.0, 4.0]), 0.1 * np.eye(2))
     motion = Round(
         COMMISSIONING, 'bend_x and bend_y', '', 'motion_1.csv', 4.0, 50.0, 'bag_1', recorded=True
     )
     log = replace(log, rounds=(motion,))
     log.ended(Stop.INTERRUPTED, 'It was interrupted.').write(folder)
+
+
+def explained_earlier(bags):
+    """Two folders of explanations, of which one is broken."""
+    earlier, broken = bags / 'why-it-stops', bags / 'why-not'
+    for folder in (earlier, broken):
+        folder.mkdir(parents=True)
+        (folder / REPORT_FILE).write_text('<p>rivals')
+    effects = [{'id': 'joint_stop', 'joint': 'bend_x'}]
+    result = {'verdict': 'missing_physics', 'effects': effects, 'next_experiment': {'why': ''}}
+    (earlier / 'report.json').write_text(json.dumps(result))
+    (broken / 'report.json').write_text('{"verdict"')
+    write_command_file(earlier / EXPERIMENT_FILE, AT, BENDING)
 
 
 @pytest.fixture
@@ -54,6 +74,52 @@ def page(running):
         assert page.order('claim', take=True)['ok']
         yield page
         page.order('release')
+
+
+def test_a_recording_is_explained_and_its_report_opens(running, page):
+    rig, bags = running, running.folder / 'bags'
+    write_short_bag(bags / 'sound.mcap', seed=2)
+    save_plant(PLANT, bags / 'rig.yaml')
+    assert 'sound.mcap' in [bag['name'] for bag in page.order('bags')['bags']]
+    assert 'there is no recording' in page.order('explain', bag='../../etc/passwd')['why']
+    begun = page.order('explain', bag='sound.mcap', plant='rig.yaml')
+    assert begun['ok'], begun
+
+    def told():
+        known = {each['id']: each for each in page.state.get('explanations', [])}
+        return known.get(begun['explanation'], {'running': True})
+
+    rig.until(lambda: not told()['running'], 'the explanation')
+    found = 'The described plant predicts the recording of bend_x.'
+    assert told()['sentence'] == found, told()
+    with urllib.request.urlopen(rig.server.address + told()['report']) as answer:
+        assert 'sandbox' in answer.headers['content-security-policy']
+        assert found in answer.read().decode()
+    assert not page.order('play', explanation=begun['explanation'])['ok']
+
+
+def test_an_experiment_of_an_earlier_explanation_is_played_while_one_holds_on(running, page):
+    rig = running
+    ready(rig, page)
+    told = {each['bag']: each for each in page.state['explanations']}
+    assert 'why-not/report.json' in told['why-not']['error']
+    assert told['why-it-stops']['sentence'] == 'missing physics: joint_stop (bend_x)'
+    with urllib.request.urlopen(rig.server.address + told['why-it-stops']['report']) as answer:
+        assert answer.read() == b'<p>rivals'
+    answer = page.order('play', explanation=told['why-it-stops']['id'])
+    assert answer['ok'], answer
+    rig.until(lambda: page.state['playing'] is not None, 'the experiment')
+    assert rig.stands()
+    rig.wanted.clear()
+    holds(rig, page, lambda: rig.wanted and abs(rig.wanted[-1][0] - rig.wanted[0][0]) > FAR)
+    page.does(pressed=False)
+    rig.until(lambda: rig.clutches and rig.clutches[-1] == 0, 'clutch 0')
+    assert rig.stands()
+    holds(rig, page, lambda: page.state['playing'] is None)
+    rig.until(lambda: rig.setting('master.source') == 'master', 'the end of it')
+    assert not rig.setting('master.hold_to_play')
+    assert rig.setting('master.command_file') == ''
+    assert rig.wanted[-1] == pytest.approx(BENDING[-1], abs=0.005)
 
 
 def begin(rig, page, **words):
@@ -105,7 +171,9 @@ def plays(rig, page, name):
     holds(rig, page, lambda: rig.wanted)
 
 
-def test_without_consent_nothing_moves_and_stop_leaves_everything_as_it_was(running, page):
+def test_without_consent_nothing_moves_and_who_loses_the_controls_loses_what_is_played(
+    running, page
+):
     rig = running
     name = begin(rig, page, plant=PLANT_NAME)
     asked = question(rig, page, name)
@@ -128,24 +196,13 @@ def test_without_consent_nothing_moves_and_stop_leaves_everything_as_it_was(runn
     plays(rig, page, name)
     for op, words in (('record', {'on': True}), ('set', {'scale': 0.5}), ('adopt', {})):
         assert page.order(op, **words)['why'] == 'a motion of an investigation is under way'
-    assert page.order('stop', investigation=name)['ok']
-    it = ended(rig, page, name)
-    assert it['goes_on']
+    assert page.order('release')['ok']
+    assert ended(rig, page, name)['goes_on']
     assert rig.client.state == 'PAUSED'
-    assert it['sentence'] == 'It was interrupted: a person ended it.'
     page.does(pressed=False)
     assert rig.stands()
     assert rig.setting('master.source') == 'master'
     assert rig.setting('compensator.mode') == 'bouc_wen'
-
-
-def test_who_loses_the_controls_loses_what_is_played(running, page):
-    rig = running
-    name = begin(rig, page, plant=PLANT_NAME)
-    plays(rig, page, name)
-    assert page.order('release')['ok']
-    ended(rig, page, name)
-    assert rig.client.state == 'PAUSED'
     rig.until(lambda: 'console_web' not in rig.handle_senders(), 'a free place of the handle')
 
 

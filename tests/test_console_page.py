@@ -1,13 +1,13 @@
 """The page of the console in a real browser: each button, each kind of hand, what ends a grip.
 
-Eight journeys for every change; the others are tried at night.
+Seven journeys for every change; the others are tried at night.
 """
 
 import re
 
+import browsed_console
 import pytest
 from browsed_console import (
-    BrowsedConsole,
     enable,
     grip,
     hold,
@@ -39,69 +39,9 @@ Object.defineProperty(WebSocket.prototype, 'onmessage', { set(take) {
 } });
 """
 
-OUTSIDE = """() => {
-  const sought = 'button, input, select, h1, dd, canvas, .touch, #next, figcaption';
-  return [...document.querySelectorAll(sought)].filter((element) => {
-    const { width, left, top, right, bottom } = element.getBoundingClientRect();
-    const across = left >= 0 && right <= innerWidth + 0.5;
-    const inside = across && top >= 0 && bottom <= innerHeight + 0.5;
-    return element.checkVisibility() && !element.closest('dialog') && width > 0 && !inside;
-  }).map((element) => element.id || element.className || element.outerHTML.slice(0, 80));
-}"""
-NAMELESS = """() => {
-  const named = (element) => element.textContent.trim() || element.getAttribute('aria-label')
-    || element.labels?.length || element.closest('[role=img]');
-  return [...document.querySelectorAll('button, input, select, canvas, .touch')]
-    .filter((element) => !named(element)).map((element) => element.outerHTML);
-}"""
-SIZES = """() => Object.fromEntries([...document.querySelectorAll('body *')]
-  .filter((element) => element.checkVisibility())
-  .map((element) => [element.id || element.tagName, getComputedStyle(element).fontSize])
-  .map(([name, size]) => [name, parseFloat(size)]))
-"""
-CUT = """() => {
-  const sought = 'button, input, select, h1, dd, canvas, .touch, #next, figcaption';
-  return [...document.querySelectorAll(sought)].filter((element) => {
-    if (!element.checkVisibility() || element.closest('dialog')) return false;
-    element.scrollIntoView({ block: element.closest('.bar, #view') ? 'nearest' : 'end' });
-    const box = element.getBoundingClientRect();
-    for (let outer = element.parentElement; outer; outer = outer.parentElement) {
-      if (getComputedStyle(outer).overflow === 'visible') continue;
-      const { left, top, right, bottom } = outer.getBoundingClientRect();
-      const across = box.left >= left - 1 && box.right <= right + 1;
-      if (!across || box.top < top - 1 || box.bottom > bottom + 1) return true;
-    }
-    const across = box.width > 0 && box.left >= 0 && box.right <= innerWidth + 1;
-    return !across || box.top < 0 || box.bottom > innerHeight + 1;
-  }).map((element) => element.id || element.className || element.outerHTML.slice(0, 80));
-}"""
-WHITE = 'rgb(242, 244, 248)'
-ANIMATION = """() => {
-  const alarm = document.createElement('div');
-  alarm.className = 'alarm high';
-  document.body.append(alarm);
-  return getComputedStyle(alarm).animationName;
-}"""
 
-
-@pytest.fixture(scope='module')
-def running(tmp_path_factory):
-    with BrowsedConsole(tmp_path_factory.mktemp('browsed')) as console:
-        yield console
-
-
-@pytest.fixture
-def console(running):
-    """Nobody operates, and the slave is limp."""
-    running.ask(lambda graph: graph.command('disable'))
-    return running
-
-
-@pytest.fixture
-def page(console, browser):
-    """Without plots, which a busy machine draws too slowly for a hand to be trusted."""
-    with console.page(browser, viewport={'width': 1024, 'height': 768}) as page:
-        yield page
+# pytest looks for the fixtures of a test in its own module.
+running, console, page = browsed_console.running, browsed_console.console, browsed_console.page
 
 
 def follows(console, page, begin):
@@ -118,52 +58,33 @@ def leaves(console, page, begin, script):
 
 
 def press_keys(page, *keys):
-    def press():
-        for key in keys:
-            page.keyboard.down(key)
-
-    def release():
-        for key in reversed(keys):
-            page.keyboard.up(key)
-
-    return press, release
+    return (
+        lambda: [page.keyboard.down(key) for key in keys],
+        lambda: [page.keyboard.up(key) for key in reversed(keys)],
+    )
 
 
-def test_a_stranger_is_led_to_the_first_motion(console, browser):
+def test_a_stranger_is_led_to_the_first_motion_by_keys_and_a_release_ends_it(console, browser):
     with console.page(browser) as page:
-        lead(console, page)
-
-
-def lead(console, page):
-    shows(page, 'next', 'Take the controls. Nothing moves yet.')
-    shows(page, 'operator', 'nobody')
-    for name in ('enable', 'home', 'disable', 'calibrate', 'compensator'):
-        expect(page.locator(f'#{name}')).to_be_disabled()
-    # Whoever may operate may end motion, always.
-    expect(page.locator('#pause')).to_be_enabled()
-    page.get_by_role('button', name='Take the controls').click()
-    shows(page, 'next', re.compile('^Hold Enable for 1 s'))
-    hold_enable(page)
-    shows(page, 'next', re.compile('^Hold Calibrate for 1 s.* hold Space and an arrow key'))
-    begin = console.now_ns
-    press, release = press_keys(page, 'Space', 'ArrowRight')
-    grip(page, press, release, follows(console, page, begin))
-    release()
-    shows(page, 'lamp', 'OPEN')
-    assert console.stands(page)
-    actual = page.locator('#plots [data-value]').nth(1)
-    assert abs(float(actual.inner_text())) < 100.0, 'the plots show where it is, in deg'
-
-
-def test_keys_hold_and_a_release_ends_it(console, page):
-    enable(page)
-    begin = console.now_ns
-    press, release = press_keys(page, 'Shift', 'Space', 'KeyA')
-    grip(page, press, release, follows(console, page, begin))
-    page.keyboard.up('Space')
-    shows(page, 'lamp', 'OPEN')
-    assert console.stands(page), 'an arrow that is still down moves nothing'
-    release()
+        shows(page, 'next', 'Take the controls. Nothing moves yet.')
+        shows(page, 'operator', 'nobody')
+        for name in ('enable', 'home', 'disable', 'calibrate', 'compensator'):
+            expect(page.locator(f'#{name}')).to_be_disabled()
+        # Whoever may operate may end motion, always.
+        expect(page.locator('#pause')).to_be_enabled()
+        page.get_by_role('button', name='Take the controls').click()
+        shows(page, 'next', re.compile('^Hold Enable for 1 s'))
+        hold_enable(page)
+        shows(page, 'next', re.compile('^Hold Calibrate for 1 s.* hold Space and an arrow key'))
+        begin = console.now_ns
+        press, release = press_keys(page, 'Space', 'ArrowRight')
+        grip(page, press, release, follows(console, page, begin))
+        page.keyboard.up('Space')
+        shows(page, 'lamp', 'OPEN')
+        assert console.stands(page), 'an arrow that is still down moves nothing'
+        release()
+        actual = page.locator('#plots [data-value]').nth(1)
+        assert abs(float(actual.inner_text())) < 100.0, 'the plots show where it is, in deg'
 
 
 @pytest.mark.nightly
@@ -260,38 +181,25 @@ def test_a_gamepad_holds_and_lets_go_when_unplugged(console, browser):
         shows(page, 'state', 'PAUSED')
 
 
-@pytest.mark.parametrize(
-    ('script', 'reason'),
-    [
-        ("dispatchEvent(new Event('blur'))", 'this page is not in front'),
-        ("document.getElementById('tab-see').click()", 'the section is out of sight'),
-    ],
-    ids=['blur', 'tab'],
-)
-def test_what_takes_the_page_away_lets_go_at_once(console, page, script, reason):
-    enable(page)
-    begin = console.now_ns
-    press, release = press_keys(page, 'Space', 'ArrowLeft')
-    grip(page, press, release, leaves(console, page, begin, script))
-    shows(page, 'lamp', 'OPEN')
-    shows(page, 'lamp-why', reason)
-    page.evaluate("dispatchEvent(new Event('focus'))")
-    page.keyboard.down('Space')
-    assert console.stands(page), 'a key that is held all along does not engage again'
-    release()
-
-
-@pytest.mark.nightly
-def test_what_the_server_said_before_it_heard_hides_no_reason(console, browser):
+def test_what_takes_the_page_away_lets_go_at_once_and_says_why(console, browser):
+    # What the server said before it heard of that hides no reason.
     with console.page(browser, script=REPEATS) as page:
-        enable(page)
-        begin = console.now_ns
-        press, release = press_keys(page, 'Space', 'ArrowLeft')
-        freeze = "document.dispatchEvent(new Event('freeze')); saidAgain()"
-        grip(page, press, release, leaves(console, page, begin, freeze))
-        shows(page, 'lamp', 'OPEN')
-        shows(page, 'lamp-why', 'this page was frozen')
-        release()
+        for script, reason in (
+            ("dispatchEvent(new Event('blur'))", 'this page is not in front'),
+            ("document.dispatchEvent(new Event('freeze'))", 'this page was frozen'),
+            ("document.getElementById('tab-see').click()", 'the section is out of sight'),
+        ):
+            enable(page)
+            begin = console.now_ns
+            press, release = press_keys(page, 'Space', 'ArrowLeft')
+            left = leaves(console, page, begin, f'{script}; saidAgain()')
+            grip(page, press, release, left)
+            shows(page, 'lamp', 'OPEN')
+            shows(page, 'lamp-why', reason)
+            page.evaluate("dispatchEvent(new Event('focus'))")
+            page.keyboard.down('Space')
+            assert console.stands(page), 'a key that is held all along does not engage again'
+            release()
 
 
 def test_of_two_pages_the_one_that_takes_over_has_the_controls(console, browser, page):
@@ -324,18 +232,6 @@ def test_of_two_pages_the_one_that_takes_over_has_the_controls(console, browser,
         shows(other, 'operator', 'nobody')
 
 
-@pytest.mark.nightly
-def test_whoever_looks_on_can_do_nothing(console, browser, page):
-    with console.page(browser, token=console.viewer) as viewer:
-        shows(viewer, 'next', 'You are looking on. To operate, open the operator’s address.')
-        expect(viewer.locator('#age')).to_contain_text('ms')
-        expect(viewer.locator('#claim')).to_be_disabled()
-        expect(viewer.locator('#claim')).not_to_have_css('background-color', WHITE)
-        viewer.keyboard.press('Escape')
-        viewer.click('#tab-explain')
-        expect(viewer.locator('#ask-go')).to_be_disabled()
-
-
 def test_pause_is_always_live_for_who_operates(console, page):
     enable(page)
     page.click('#pause')
@@ -362,8 +258,31 @@ def test_a_button_that_is_not_held_for_a_second_does_nothing(console, page):
     page.locator('#enable').click()
     page.focus('#enable')
     page.keyboard.press('Enter')
-    page.wait_for_timeout(1500)
+    page.wait_for_timeout(HELD_MS)
     shows(page, 'state', 'DISABLED')
+    enable(page)
+    page.keyboard.press('Escape')
+    shows(page, 'state', 'PAUSED')
+    page.keyboard.down('KeyE')
+    until(page, lambda: page.locator('#enable').evaluate(SHARE) > 0.0)
+    page.keyboard.press('Escape')
+    assert page.locator('#enable').evaluate(SHARE) == 0.0, 'a pause ends what is held to resume'
+    page.wait_for_timeout(HELD_MS)
+    shows(page, 'state', 'PAUSED')
+    page.keyboard.up('KeyE')
+
+
+@pytest.mark.nightly
+def test_what_covers_the_view_or_the_keys_lets_go(console, page):
+    for covers in ('Meta', '?'):
+        enable(page)
+        begin = console.now_ns
+        press, release = press_keys(page, 'Space', 'ArrowLeft')
+        grip(page, press, release, follows(console, page, begin))
+        page.keyboard.press(covers)
+        shows(page, 'lamp', 'OPEN')
+        assert console.stands(page)
+        release()
 
 
 def test_home_calibration_and_compensation(console, page):
@@ -461,70 +380,6 @@ def test_recordings_are_made_and_offered_for_explanation(console, page):
     shows(page, 'state', 'DISABLED')
 
 
-@pytest.mark.nightly
-def test_every_node_is_seen_with_its_health(console, page):
-    page.click('#tab-see')
-    for node in console.ask(
-        lambda graph: sorted({name.split(':')[0] for name in graph.diagnostics})
-    ):
-        row = page.locator('#nodes tr', has=page.get_by_text(node, exact=True))
-        expect(row).to_have_count(1)
-        expect(row.locator('.health')).to_have_text(re.compile('ok|warning|error'))
-    expect(page.locator('#states li').last).to_contain_text('DISABLED')
-    expect(page.locator('#counters')).to_contain_text('pictures')
-    expect(page.locator('#clients')).to_contain_text('this page')
-
-
-@pytest.mark.nightly
-def test_pause_ends_what_is_held_to_resume(console, page):
-    enable(page)
-    page.keyboard.press('Escape')
-    shows(page, 'state', 'PAUSED')
-    page.keyboard.down('KeyE')
-    until(page, lambda: page.locator('#enable').evaluate(SHARE) > 0.0)
-    page.keyboard.press('Escape')
-    assert page.locator('#enable').evaluate(SHARE) == 0.0
-    page.wait_for_timeout(HELD_MS)
-    shows(page, 'state', 'PAUSED')
-    page.keyboard.up('KeyE')
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize('covers', ['?', 'Meta'])
-def test_what_covers_the_view_or_the_keys_lets_go(console, page, covers):
-    enable(page)
-    begin = console.now_ns
-    press, release = press_keys(page, 'Space', 'ArrowLeft')
-    grip(page, press, release, follows(console, page, begin))
-    page.keyboard.press(covers)
-    shows(page, 'lamp', 'OPEN')
-    assert console.stands(page)
-    release()
-
-
-@pytest.mark.nightly
-def test_a_view_that_is_turned_says_so_and_is_turned_back(console, page):
-    box = page.locator('#space').bounding_box()
-    page.mouse.move(box['x'] + box['width'] / 2, box['y'] + box['height'] / 2)
-    page.mouse.down()
-    page.mouse.move(box['x'] + box['width'] / 4, box['y'] + box['height'] / 2)
-    page.mouse.up()
-    page.get_by_role('button', name='View turned: reset').click()
-    expect(page.locator('#view-reset')).to_be_hidden()
-
-
-@pytest.mark.nightly
-def test_help_tells_the_keys(console, page):
-    page.keyboard.press('?')
-    expect(page.locator('#help')).to_be_visible()
-    expect(page.locator('#help')).to_contain_text('Space')
-    page.keyboard.press('Escape')
-    expect(page.locator('#help')).to_be_hidden()
-    page.click('#help-open')
-    page.get_by_role('button', name='Close').click()
-    expect(page.locator('#help')).to_be_hidden()
-
-
 def test_a_page_whose_server_ends_says_so_and_comes_back_without_the_controls(console, browser):
     with console.page(browser) as page:
         enable(page)
@@ -539,51 +394,3 @@ def test_a_page_whose_server_ends_says_so_and_comes_back_without_the_controls(co
         refused = [text for text in page.complaints if 'ERR_CONNECTION_REFUSED' not in text]
         assert refused == []
         page.complaints.clear()
-
-
-@pytest.mark.nightly
-def test_a_page_without_its_key_says_what_to_do(console, browser):
-    with browser.new_context() as context:
-        page = context.new_page()
-        page.goto(f'{console.address}/')
-        expect(page.locator('#token')).to_contain_text('endoscope console')
-        page.goto(f'{console.address}/?#token=wrong')
-        expect(page.locator('#token')).to_contain_text('refused this page')
-        page.fill('#token-address', f'{console.address}/#token={console.viewer}')
-        page.get_by_role('button', name='Open', exact=True).click()
-        expect(page.locator('#next')).to_contain_text('You are looking on')
-        assert page.url == f'{console.address}/', 'the key is not left in the address'
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize(
-    ('width', 'height', 'touch'), [(1440, 900, False), (1024, 768, True), (768, 1024, True)]
-)
-def test_all_of_it_fits_on_the_screen(console, browser, width, height, touch):
-    how = {'viewport': {'width': width, 'height': height}, 'has_touch': touch}
-    with console.page(browser, **how) as page:
-        assert page.evaluate(OUTSIDE) == []
-        assert page.evaluate(NAMELESS) == []
-        root = 'document.documentElement'
-        assert page.evaluate(f'[{root}.scrollWidth, {root}.scrollHeight]') == [width, height]
-        sizes = page.evaluate(SIZES)
-        assert sizes['state'] == max(sizes.values()), 'the state is the largest word'
-
-
-@pytest.mark.nightly
-def test_nothing_is_cut_or_out_of_reach_in_a_small_window(console, browser):
-    with console.page(browser) as page:
-        for width, height in ((1440, 900), (1280, 600), (1100, 560), (800, 600), (390, 844)):
-            page.set_viewport_size({'width': width, 'height': height})
-            page.wait_for_timeout(200)
-            assert page.evaluate(CUT) == [], (width, height)
-        expect(page.locator('#tab-plots')).to_be_hidden()
-        expect(page.locator('#plots')).to_be_visible()
-
-
-@pytest.mark.nightly
-def test_nothing_flashes_for_who_asked_for_less_motion(console, browser):
-    with console.page(browser, reduced_motion='reduce') as page:
-        assert page.evaluate(ANIMATION) == 'none'
-    with console.page(browser, reduced_motion='no-preference') as page:
-        assert page.evaluate(ANIMATION) == 'alarm'

@@ -42,25 +42,11 @@ def test_a_proposal_is_written_once_and_told_as_json(tmp_path, capsys):
     assert 'exists already' in capsys.readouterr().err
 
 
-def test_the_help_has_every_key_of_a_mapping(capsys):
-    with pytest.raises(SystemExit) as stop:
-        main(['convert', '--help'])
-    assert stop.value.code == 0
-    told = capsys.readouterr().out
-    for key in ('delimiter', 'decimal_comma', 'header_lines', 'start_s', 'sample_and_hold'):
-        assert f'{key}: ' in told
-
-
-@pytest.fixture
-def servo(tmp_path):
+def test_a_real_servo_is_read_with_its_dates_and_shows_its_backlash(tmp_path):
     out = tmp_path / 'servo'
     assert main(['convert', TABLE, '--mapping', str(REAL / 'mapping.yaml'), '--out', str(out)]) == 0
     bag = open_bag(out)
-    return bag.joint_state('slave/servo_jp'), bag.joint_state('slave/measured_js')
-
-
-def test_a_real_servo_is_read_with_its_dates(servo, capsys):
-    target, position = servo
+    target, position = (bag.joint_state(f'slave/{name}') for name in ('servo_jp', 'measured_js'))
     assert len(target) == len(position) == 138
     # 2025-11-09T09:27:03.748Z
     assert target.stamp_ns[0] == 1_762_680_423_748_000_000
@@ -68,11 +54,7 @@ def test_a_real_servo_is_read_with_its_dates(servo, capsys):
     assert np.unique(np.round(target.position / COUNT)).tolist() == [-100.0, 0.0, 100.0]
     assert position.position.min() / COUNT == pytest.approx(-94.0)
     assert position.position.max() / COUNT == pytest.approx(95.0)
-
-
-def test_a_real_servo_shows_its_backlash(servo):
-    """It comes to rest short of its target from either side; a light pull moves it in between."""
-    target, position = servo
+    # It comes to rest short of its target from either side; a light pull moves it in between.
     seconds, counts = target.seconds(), position.position[:, 0] / COUNT
     at_zero = np.abs(target.position[:, 0]) < COUNT / 2
     from_below = counts[at_zero & (seconds > 1.4) & (seconds < 1.9)]

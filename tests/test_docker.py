@@ -29,13 +29,6 @@ STARTED_BY_HAND = {'graph', 'simulation_clock', 'replay', 'healthcheck'}
 PAGE = 'web_console'
 
 
-def _entry_points_of_nodes() -> set[str]:
-    settings = ConfigParser(interpolation=None)
-    settings.read(ROOT / 'ros_ws/src/endoscope_nodes/setup.cfg', encoding='utf-8')
-    scripts = settings['options.entry_points']['console_scripts']
-    return {line.split(' = ')[0] for line in scripts.split('\n') if line}
-
-
 def _compose_command() -> list[str]:
     for command in (['docker', 'compose'], ['docker-compose']):
         if shutil.which(command[0]):
@@ -62,7 +55,11 @@ def test_every_node_is_a_service() -> None:
     services = _interpolated(COMPOSE_FILE)
     commands = {name: shlex.split(service['command']) for name, service in services.items()}
     assert commands.pop(PAGE)[:2] == ['endoscope', 'console']
-    assert {words[0] for words in commands.values()} == _entry_points_of_nodes() - STARTED_BY_HAND
+    settings = ConfigParser(interpolation=None)
+    settings.read(ROOT / 'ros_ws/src/endoscope_nodes/setup.cfg', encoding='utf-8')
+    scripts = settings['options.entry_points']['console_scripts']
+    entry_points = {line.split(' = ')[0] for line in scripts.split('\n') if line}
+    assert {words[0] for words in commands.values()} == entry_points - STARTED_BY_HAND
     assert all(w == [PROGRAMS[name].name, '--ros-args'] for name, w in commands.items())
 
 
@@ -74,13 +71,6 @@ def test_the_page_is_served_with_options_that_it_has_and_starts_no_second_graph(
     assert given.no_graph
     assert str(given.rig) == '/given/rig.yaml'
     assert f'127.0.0.1:{given.port}/' in _interpolated(COMPOSE_FILE)[PAGE]['healthcheck']['test'][3]
-
-
-def test_the_image_is_built_once_and_pulled_never() -> None:
-    services = _interpolated(COMPOSE_FILE).values()
-    [built] = [service['build'] for service in services if 'build' in service]
-    assert built['target'] == 'robot'
-    assert {service['pull_policy'] for service in services} == {'never'}
 
 
 @pytest.mark.parametrize('files', [(COMPOSE_FILE,), (COMPOSE_FILE, HARDWARE_FILE)])
@@ -137,14 +127,15 @@ def test_a_container_finds_what_the_image_has_compiled(tmp_path) -> None:
     assert 'data saved' not in said.stdout
 
 
-def test_nodes_share_one_network_domain_and_user() -> None:
-    services = yaml.safe_load(COMPOSE_FILE.read_text())['services'].values()
+def test_services_share_image_network_and_user_and_may_do_no_more_than_they_have_to() -> None:
+    compose = yaml.safe_load(COMPOSE_FILE.read_text())
+    services = compose['services']
     for key in ('network_mode', 'user', 'environment', 'image'):
-        assert len({str(service[key]) for service in services}) == 1, key
-
-
-def test_no_service_may_do_more_than_it_has_to() -> None:
-    for name, service in yaml.safe_load(COMPOSE_FILE.read_text())['services'].items():
+        assert len({str(service[key]) for service in services.values()}) == 1, key
+    [built] = [service['build'] for service in services.values() if 'build' in service]
+    assert built['target'] == 'robot'
+    for name, service in services.items():
+        assert service['pull_policy'] == 'never'
         assert service['restart'] == 'no', name
         assert service['read_only'] is True
         assert service['cap_drop'] == ['ALL']
@@ -154,13 +145,13 @@ def test_no_service_may_do_more_than_it_has_to() -> None:
         assert service['ulimits'] == {'rtprio': 99, 'memlock': -1}
         if name != PAGE:
             assert service['healthcheck']['test'][-2:] == ['healthcheck', name]
-
-
-def test_hardware_takes_nothing_of_that_back() -> None:
-    hardened = set(yaml.safe_load(COMPOSE_FILE.read_text())['x-node']) - {'command', 'volumes'}
-    for service in yaml.safe_load(HARDWARE_FILE.read_text())['services'].values():
-        assert not hardened & set(service)
-        assert not {'cap_add', 'privileged', 'healthcheck'} & set(service)
+    # Hardware takes nothing of that back.
+    hardened = set(compose['x-node']) - {'command', 'volumes'}
+    for name, service in yaml.safe_load(HARDWARE_FILE.read_text())['services'].items():
+        assert not (hardened | {'cap_add', 'privileged', 'healthcheck'}) & set(service)
+        node, *arguments = service['command'].split()
+        assert node == name in services
+        assert 'device' in re.findall(r'-p (\w+):=', ' '.join(arguments))
 
 
 def test_the_image_is_built_on_what_is_pinned_and_runs_as_nobody_special() -> None:
@@ -176,49 +167,23 @@ def test_the_image_is_built_on_what_is_pinned_and_runs_as_nobody_special() -> No
         assert user.split(':')[0] not in ('0', 'root')
 
 
-def test_compose_accepts_the_file() -> None:
-    command = _compose_command()
-    done = subprocess.run(
-        [*command, '--file', str(COMPOSE_FILE), 'config', '--services'],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+def test_compose_accepts_the_files() -> None:
+    compose = [*_compose_command(), '--file', str(COMPOSE_FILE)]
+
+    def run(*words: str, **given: str) -> subprocess.CompletedProcess[str]:
+        command, environment = [*compose, *words], os.environ | given
+        return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+    done = run('config', '--services')
     assert done.returncode == 0, done.stderr
     assert set(done.stdout.split()) == set(yaml.safe_load(COMPOSE_FILE.read_text())['services'])
-
-
-def test_hardware_changes_how_nodes_are_started_and_only_by_parameters_that_they_have() -> None:
-    services = yaml.safe_load(COMPOSE_FILE.read_text())['services']
-    for name, service in yaml.safe_load(HARDWARE_FILE.read_text())['services'].items():
-        assert name in services
-        node, *arguments = service['command'].split()
-        assert node == name
-        given = re.findall(r'-p (\w+):=', ' '.join(arguments))
-        assert 'device' in given
-        declared = {
-            one.name for kind in (BeatParameters, *OF_NODE[name]) for one in described(kind)
-        }
-        assert set(given) <= declared
-
-
-def test_compose_accepts_the_hardware() -> None:
-    command = [*_compose_command(), '--file', str(COMPOSE_FILE), '--file', str(HARDWARE_FILE)]
+    hardware = ('--file', str(HARDWARE_FILE), 'config')
     ports = {'MOTOR_PORT': '/dev/ttyUSB0', 'LOAD_CELL_PORT': '/dev/ttyUSB1'}
-    rig = {'TRACKER_PORT': '/dev/ttyUSB2', 'RIG': '/srv/rig'}
-    done = subprocess.run(
-        [*command, 'config'],
-        env=os.environ | ports | rig,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = run(*hardware, **ports, TRACKER_PORT='/dev/ttyUSB2', RIG='/srv/rig')
     assert done.returncode == 0, done.stderr
     motors = yaml.safe_load(done.stdout)['services']['motor_driver']
     assert 'device:=dynamixel' in motors['command']
-    without_ports = subprocess.run(
-        [*command, 'config'], capture_output=True, text=True, check=False
-    )
+    without_ports = run(*hardware)
     assert without_ports.returncode != 0
     assert '_PORT' in without_ports.stderr or 'RIG' in without_ports.stderr
 

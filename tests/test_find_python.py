@@ -43,13 +43,6 @@ needs_no_system_python = pytest.mark.skipif(
 )
 
 
-@needs_no_system_python
-def test_missing_python_is_said_in_one_line(tmp_path: Path) -> None:
-    status, line = _find(tmp_path)
-    assert status == 1
-    assert line.startswith('Python 3.12 is not on this machine: apt install python3.12')
-
-
 def test_python_on_the_path_is_found(tmp_path: Path) -> None:
     (tmp_path / 'bin').mkdir()
     (tmp_path / 'bin' / 'python3.12').symlink_to(Path(sys.executable).resolve())
@@ -67,14 +60,6 @@ def test_shim_that_fails_gives_way_to_the_version_behind_it(tmp_path: Path) -> N
     assert found == str(Path(sys.executable).resolve())
 
 
-@needs_no_system_python
-def test_missing_venv_module_is_said(tmp_path: Path) -> None:
-    _fake_python(tmp_path / 'bin' / 'python3.12', 'echo /opt/python3.12; exit 3')
-    status, line = _find(tmp_path, PATH=str(tmp_path / 'bin'))
-    assert status == 1
-    assert line == '/opt/python3.12 has no venv module: apt install python3.12-venv'
-
-
 def test_python_that_was_named_is_not_replaced_by_another(tmp_path: Path) -> None:
     named = _fake_python(tmp_path / 'python3.9', 'exit 5')
     status, line = _find(tmp_path, PYTHON=str(named), PATH=str(Path(sys.executable).parent))
@@ -83,8 +68,17 @@ def test_python_that_was_named_is_not_replaced_by_another(tmp_path: Path) -> Non
 
 
 @needs_no_system_python
-def test_sourced_ros_without_rclpy_is_said(tmp_path: Path) -> None:
-    _fake_python(tmp_path / 'bin' / 'python3.12', 'echo /opt/python3.12; exit 4')
-    status, line = _find(tmp_path, 'ros', ROS_DISTRO='jazzy', PATH=str(tmp_path / 'bin'))
-    assert status == 1
-    assert 'install ros-jazzy-rclpy' in line
+@pytest.mark.parametrize(
+    ('status', 'arguments', 'said'),
+    [
+        (None, (), 'Python 3.12 is not on this machine: apt install python3.12'),
+        (3, (), '/opt/python3.12 has no venv module: apt install python3.12-venv'),
+        (4, ('ros',), 'install ros-jazzy-rclpy'),
+    ],
+)
+def test_what_is_missing_is_said_in_one_line(tmp_path: Path, status, arguments, said) -> None:
+    if status is not None:
+        _fake_python(tmp_path / 'bin' / 'python3.12', f'echo /opt/python3.12; exit {status}')
+    failed, line = _find(tmp_path, *arguments, ROS_DISTRO='jazzy', PATH=str(tmp_path / 'bin'))
+    assert failed == 1
+    assert said in line

@@ -58,11 +58,6 @@ def calibrate(graph, happens):
         return asker.calibrate(patience_s=5.0)
 
 
-def test_a_calibration_that_ends_before_it_is_heard_of_is_told(graph):
-    with pytest.raises(GraphError, match=ABORTED):
-        calibrate(graph, lambda: graph.command('pause'))
-
-
 def test_one_that_ends_in_the_instant_in_which_it_began_is_told(graph):
     def lose_the_session():
         calibration = graph.nodes['calibration']

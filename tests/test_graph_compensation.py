@@ -99,12 +99,10 @@ def test_every_mode_comes_in_while_moving_without_a_jump(tmp_path):
             assert len(drives) == 0.4 * TICK_RATE
             largest = steps[before - 2 : before + TICK_RATE // 20].max()
             assert largest <= 2.0 * steps[: before - 2].max(), node
-
-
-def test_what_the_calibration_did_not_find_is_not_guessed():
-    with SimulatedGraph() as graph:
-        graph.enable()
-        graph.nodes['compensator'].findings = CalibrationFindings(70)
+        # What a calibration did not find is not guessed.
+        graph.set('master', source='none')
+        compensator = graph.nodes['compensator']
+        compensator.findings = CalibrationFindings(70)
         graph.set('compensator', mode='physical', selected_by='plant')
-        graph.advance(0.3)
-        assert graph.nodes['compensator']._feedforward.law.mode == 'none'
+        graph.advance(0.6)
+        assert compensator._feedforward.law.mode == 'none'

@@ -88,7 +88,7 @@ def test_it_plays_while_the_clutch_is_held_rests_at_release_and_goes_on_from_the
     assert graph.state == 'ENABLED'
 
 
-def test_a_clutch_that_falls_silent_is_released(graph, hand):
+def test_silence_or_a_pause_ends_it_and_what_is_resumed_waits_for_the_hand(graph, hand):
     commands = graph.listen('slave/servo_jp')
     hand.says(True, 0.4)
     assert commands
@@ -96,11 +96,7 @@ def test_a_clutch_that_falls_silent_is_released(graph, hand):
     commands.clear()
     graph.advance(0.3)
     assert commands == []
-
-
-def test_a_pause_ends_it_and_what_is_resumed_waits_for_the_hand(graph, hand):
-    commands = graph.listen('slave/servo_jp')
-    hand.says(True, 0.4)
+    hand.says(True, 0.3)
     assert graph.command('pause') == 'PAUSED'
     hand.says(False, 0.1)
     assert graph.command('resume') == 'ENABLED'

@@ -24,43 +24,32 @@ STREAMS = {
 }
 
 
-def motion():
-    with SimulatedGraph() as graph:
-        streams = {topic: graph.listen(topic, names) for topic, names in STREAMS.items()}
-        graph.enable()
-        graph.set('master', source='motion', motion='non_periodic')
-        graph.advance(1.5)
-        return streams
-
-
-def test_two_motions_are_the_same_to_the_last_bit():
-    first, second = motion(), motion()
-    for topic in STREAMS:
-        assert first[topic] or topic == 'calibration/servo_jp', topic
-        assert first[topic] == second[topic], topic
-
-
 def calibration(clock):
-    """Result but for its time, and what was commanded and read until the motion had ended."""
+    """Result but for its time, and what was commanded and read in a motion before it and in it."""
     overrides = {'calibration': {'motion': 'brief'}, 'simulation_clock': clock}
     with SimulatedGraph(overrides=overrides) as graph:
         streams = {topic: graph.listen(topic, names) for topic, names in STREAMS.items()}
         graph.enable()
+        graph.set('master', source='motion', motion='non_periodic')
+        graph.advance(1.0)
+        graph.set('master', source='none')
+        graph.advance(0.5)
         result = graph.calibrate()
     end = streams['calibration/servo_jp'][-1].stamp_ns
     heard = {topic: [s for s in stream if s.stamp_ns <= end] for topic, stream in streams.items()}
     return {key: value for key, value in result.items() if 'duration' not in key}, heard
 
 
-def test_a_calibration_at_a_pace_beside_busy_processes_is_the_same_to_the_last_bit():
+def test_calibration_and_motion_at_a_pace_beside_busy_processes_is_the_same_to_the_last_bit():
     alone = calibration({})
-    busy = [subprocess.Popen([sys.executable, '-c', 'while True: pass']) for _ in range(3)]
+    busy = [subprocess.Popen([sys.executable, '-c', 'while True: pass']) for _ in range(2)]
     try:
         beside = calibration({'speed': 5.0})
     finally:
         for process in busy:
             process.kill()
             process.wait()
+    assert all(alone[1].values())
     assert len(alone[1]['wires/measured_js']) > 1000
     assert beside == alone
 
@@ -72,7 +61,6 @@ def test_another_seed_gives_other_noise():
             graph.advance(0.05)
             return samples
 
-    assert wires(5) == wires(5)
     assert wires(5) != wires(6)
 
 
@@ -100,15 +88,11 @@ def test_the_graphs_motors_are_the_plants():
     )
 
 
-@pytest.mark.parametrize(
-    ('missing', 'topic'),
-    [('load_cells', 'wires/measured_js'), ('motor_driver', 'motor/measured_js')],
-)
-def test_the_topic_that_is_waited_for_is_named(missing, topic):
+def test_the_topic_that_is_waited_for_is_named():
     overrides = {'simulation_clock': {'timeout': 0.2}}
     with (
-        SimulatedGraph(without=(missing,), overrides=overrides) as graph,
-        pytest.raises(BarrierTimeout, match=topic),
+        SimulatedGraph(without=('load_cells',), overrides=overrides) as graph,
+        pytest.raises(BarrierTimeout, match='wires/measured_js'),
     ):
         graph.advance(0.1)
 

@@ -1,6 +1,7 @@
 """A tracker that goes blind, dies, or reads single samples wrong."""
 
 import numpy as np
+from commanded_graph import BOUND
 from simulated_graph import TICK_RATE, SimulatedGraph
 from tubes import slave_of
 
@@ -45,7 +46,7 @@ def test_a_blind_tracker_fades_the_feedback_out_and_back_in_without_a_jump():
         assert graph.states[-1] == 'ENABLED'
 
 
-def test_a_dead_tracker_node_leaves_the_feed_forward_going():
+def test_a_dead_tracker_node_leaves_the_feed_forward_going_and_comes_back_without_a_jump():
     with SimulatedGraph(overrides=CALIBRATION) as graph:
         drives = graph.listen('motor/servo_jp', ('motor_x', 'motor_y'))
         graph.enable()
@@ -57,6 +58,11 @@ def test_a_dead_tracker_node_leaves_the_feed_forward_going():
         graph.advance(2.0)
         assert len(drives) == 2 * TICK_RATE
         assert weight(graph) == 0.0
+        graph.start('em_tracker')
+        graph.advance(2.0)
+        assert weight(graph) > 0.9
+        steps = np.abs(np.diff([s.position for s in drives], axis=0))
+        assert steps.max() < BOUND
         assert graph.states[-1] == 'ENABLED'
 
 

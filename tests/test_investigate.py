@@ -23,6 +23,7 @@ from endoscope_nodes.client.graph_parameters import read_parameter
 from endoscope_nodes.client.motion_player import MotionPlayer
 from endoscope_nodes.names import SLAVE_COMMAND
 from endoscope_nodes.nodes.recorder import RecorderNode
+from endoscope_nodes.runtime.private_domain import private_domain
 
 pytestmark = pytest.mark.engine
 
@@ -55,6 +56,7 @@ def graph(rig=None, plant=None, folder=None):
         overrides['motor_driver'] = {'plant_file': str(folder / 'slave.yaml')}
     return LiveGraph(
         None,
+        private_domain(),
         lock_step=True,
         overrides=overrides,
         rate=TICK_RATE,
@@ -63,25 +65,29 @@ def graph(rig=None, plant=None, folder=None):
     )
 
 
-def test_a_motion_is_played_in_a_session_of_its_own_and_leaves_everything_as_it_was(
-    motion, tmp_path
-):
-    asked = []
+@pytest.fixture(scope='module')
+def live():
     with graph() as live:
-        client = live.client
-        live.set('master', source='master')
-        with pytest.raises(NotPlayedError):
-            MotionPlayer(client, lambda words: False).play(*motion, tmp_path / 'unwanted')
-        assert client.state == 'DISABLED'
-        assert not (tmp_path / 'unwanted').exists()
-        player = MotionPlayer(client, lambda words: asked.append(words) or True)
-        player.play(*motion, tmp_path / 'bag')
-        live.advance(1.0)
-        assert client.state == 'DISABLED'
-        assert not client.session
-        assert read_parameter(client, 'compensator.mode').value == 'bouc_wen'
-        assert read_parameter(client, 'master.source').value == 'master'
-        assert abs(live.shafts[0]) < 0.05
+        yield live
+
+
+def test_a_motion_is_played_in_a_session_of_its_own_and_leaves_everything_as_it_was(
+    live, motion, tmp_path
+):
+    client, asked = live.client, []
+    live.set('master', source='master')
+    with pytest.raises(NotPlayedError):
+        MotionPlayer(client, lambda words: False).play(*motion, tmp_path / 'unwanted')
+    assert client.state == 'DISABLED'
+    assert not (tmp_path / 'unwanted').exists()
+    player = MotionPlayer(client, lambda words: asked.append(words) or True)
+    player.play(*motion, tmp_path / 'bag')
+    live.advance(1.0)
+    assert client.state == 'DISABLED'
+    assert not client.session
+    assert read_parameter(client, 'compensator.mode').value == 'bouc_wen'
+    assert read_parameter(client, 'master.source').value == 'master'
+    assert abs(live.shafts[0]) < 0.05
     assert asked == ['Play this motion: There and back of bend_x, 2 s, at most 29 deg?']
     commands = open_bag(tmp_path / 'bag').joint_state(SLAVE_COMMAND).select(JOINTS)
     played = commands.require('position')
@@ -126,50 +132,45 @@ def test_a_fault_is_told_with_its_cause_and_what_was_recorded_stays(motion, tmp_
     assert open_bag(tmp_path / 'bag').joint_state(SLAVE_COMMAND).stamp_ns.size
 
 
-def test_an_interruption_pauses_the_graph(motion, tmp_path):
-    with graph() as live:
-        client = live.client
-        inner, heard = client.serve, []
+def test_an_interruption_pauses_the_graph_and_what_a_person_has_paused_is_not_enabled_again(
+    live, motion, tmp_path
+):
+    client, heard, given = live.client, [], []
+    inner = client.serve
 
-        def interrupted(seconds):
-            heard.append(client.state)
-            if heard.count('ENABLED') == 20:
-                raise KeyboardInterrupt
-            return inner(seconds)
+    def interrupted(seconds):
+        heard.append(client.state)
+        if heard.count('ENABLED') == 20:
+            raise KeyboardInterrupt
+        return inner(seconds)
 
-        client.serve = interrupted
-        with pytest.raises(KeyboardInterrupt):
-            MotionPlayer(client, lambda words: True).play(*motion, tmp_path / 'bag')
-        assert client.state == 'PAUSED'
-        live.advance(0.5)
-        assert read_parameter(client, 'master.source').value == 'none'
-        # It is continued from there.
-        client.serve = inner
-        MotionPlayer(client, lambda words: True).play(*motion, tmp_path / 'again')
-    assert open_bag(tmp_path / 'bag').joint_state(SLAVE_COMMAND).stamp_ns.size
+    client.serve = interrupted
+    with pytest.raises(KeyboardInterrupt):
+        MotionPlayer(client, lambda words: True).play(*motion, tmp_path / 'interrupted')
+    assert client.state == 'PAUSED'
+    live.advance(0.5)
+    assert read_parameter(client, 'master.source').value == 'master'
+    assert open_bag(tmp_path / 'interrupted').joint_state(SLAVE_COMMAND).stamp_ns.size
+    # It is continued from there.
+    client.serve = inner
+    MotionPlayer(client, lambda words: True).play(*motion, tmp_path / 'again')
+    player = MotionPlayer(client, lambda words: given.append('go') or True, hold_to_play=True)
 
+    def person(seconds):
+        if given == ['go'] and not player.prepares:
+            given.append('enable')
+            client.order('enable')
+        elif given == ['go', 'enable'] and client.state == 'ENABLED':
+            given.append('pause')
+            client.order('pause')
+        return inner(seconds)
 
-def test_what_a_person_has_paused_is_not_enabled_again(motion, tmp_path):
-    given = []
-    with graph() as live:
-        client = live.client
-        player = MotionPlayer(client, lambda words: given.append('go') or True, hold_to_play=True)
-        inner = client.serve
-
-        def person(seconds):
-            if given == ['go'] and not player.prepares:
-                given.append('enable')
-                client.order('enable')
-            elif given == ['go', 'enable'] and client.state == 'ENABLED':
-                given.append('pause')
-                client.order('pause')
-            return inner(seconds)
-
-        client.serve = person
-        with pytest.raises(NotPlayedError, match='PAUSED'):
-            player.play(*motion, tmp_path / 'bag')
-        assert given == ['go', 'enable', 'pause']
-        assert client.state == 'PAUSED'
+    client.serve = person
+    with pytest.raises(NotPlayedError, match='PAUSED'):
+        player.play(*motion, tmp_path / 'paused')
+    client.serve = inner
+    assert given == ['go', 'enable', 'pause']
+    assert client.state == 'PAUSED'
 
 
 def test_without_a_person_to_ask_it_does_not_begin(tmp_path, capsys):

@@ -13,7 +13,6 @@ from operated_graph import OperatedGraph
 from security_policy import NAMESPACE, allowed
 from sensor_msgs.msg import Joy
 from simulated_graph import SimulatedGraph
-from std_msgs.msg import Header
 
 from endoscope_bags import open_bag
 from endoscope_core.errors import NotPlayedError, RigStoppedError
@@ -25,7 +24,7 @@ from endoscope_nodes.client import motion_player
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import GraphError
 from endoscope_nodes.client.motion_player import MotionPlayer
-from endoscope_nodes.names import MASTER_CLUTCH, MOTION_SESSION, SLAVE_COMMAND
+from endoscope_nodes.names import MASTER_CLUTCH, SLAVE_COMMAND
 from endoscope_nodes.runtime.qos import EVENT
 
 pytestmark = pytest.mark.engine
@@ -125,44 +124,25 @@ def stands_still(graph):
     return before < STILL and now < STILL
 
 
-def test_a_motion_that_nothing_happens_to_is_played_to_its_end(graph, motion, tmp_path):
-    assert attacked(graph, motion, tmp_path, lambda: None) is None
-    assert stands_still(graph)
-
-
-def stranger_commands(graph, strangers):
-    sender = Sender(graph, SLAVE_COMMAND)
-    strangers.append(sender.publisher)
-    for _ in range(5):
-        sender.send((0.5, 0.5))
-        graph.advance(0.01)
-
-
 def test_a_stranger_who_commands_is_a_fault(graph, motion, tmp_path, strangers):
-    error = attacked(graph, motion, tmp_path, lambda: stranger_commands(graph, strangers))
+    def happens():
+        sender = Sender(graph, SLAVE_COMMAND)
+        strangers.append(sender.publisher)
+        for _ in range(5):
+            sender.send((0.5, 0.5))
+            graph.advance(0.01)
+
+    error = attacked(graph, motion, tmp_path, happens)
     assert isinstance(error, RigStoppedError)
     assert 'senders' in str(error)
     gone(graph, strangers)
     assert stands_still(graph)
 
 
-def test_a_stranger_at_the_clutch_is_a_fault(graph, motion, tmp_path, strangers):
+def test_a_session_that_is_taken_ends_the_motion(graph, motion, tmp_path):
     def happens():
-        strangers.append(graph.speak(Joy, MASTER_CLUTCH, EVENT))
-        strangers[-1].publish(Joy(buttons=[1]))
-        graph.advance(0.05)
-
-    error = attacked(graph, motion, tmp_path, happens)
-    assert isinstance(error, (RigStoppedError, NotPlayedError)), error
-    gone(graph, strangers)
-    assert stands_still(graph)
-
-
-@pytest.mark.parametrize('commands', [('disable',), ('pause', 'resume')])
-def test_a_session_that_is_taken_ends_the_motion(graph, motion, tmp_path, commands):
-    def happens():
-        for command in commands:
-            graph.command(command)
+        graph.command('pause')
+        graph.command('resume')
 
     error = attacked(graph, motion, tmp_path, happens)
     assert isinstance(error, NotPlayedError), error
@@ -196,21 +176,20 @@ def test_a_dead_man_who_lets_go_stops_the_motion(graph, motion, tmp_path, strang
     assert stands_still(graph)
 
 
-@pytest.mark.parametrize('name', ['master', 'supervisor'])
-def test_a_node_that_dies_ends_the_motion(graph, motion, tmp_path, monkeypatch, name):
+def test_a_master_that_dies_ends_the_motion(graph, motion, tmp_path, monkeypatch):
     # What it then asks in vain is waited for less long, so that the test is not.
     monkeypatch.setattr(motion_player, 'PATIENCE_S', 5.0)
     moved = []
 
     def dies():
-        graph.kill(name)
+        graph.kill('master')
         graph.advance(STOPS_S)
         moved.append(Moved(graph))
 
     error = attacked(graph, motion, tmp_path, dies)
     assert error is not None
     assert moved[0].of_shafts < STILL
-    SimulatedGraph.start(graph, name)
+    SimulatedGraph.start(graph, 'master')
     graph.advance(1.0)
     assert stands_still(graph)
 
@@ -258,15 +237,3 @@ def test_a_program_that_is_killed_moves_nothing_on_and_is_in_no_way(graph, motio
     graph.wait(lambda: 'investigate' not in graph.probe.get_node_names())
     assert attacked(graph, motion, tmp_path, lambda: None) is None
     assert open_bag(tmp_path / 'out' / 'bag_1').joint_state(SLAVE_COMMAND).stamp_ns.size
-
-
-def test_a_rival_of_the_supervisor_ends_the_motion(graph, motion, tmp_path, strangers):
-    def happens():
-        strangers.append(graph.speak(Header, MOTION_SESSION, EVENT))
-        strangers[-1].publish(Header(frame_id='session-99'))
-        graph.advance(0.1)
-
-    error = attacked(graph, motion, tmp_path, happens)
-    assert isinstance(error, (RigStoppedError, NotPlayedError, GraphError)), error
-    gone(graph, strangers)
-    assert stands_still(graph)

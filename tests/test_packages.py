@@ -185,21 +185,16 @@ def test_manifests_agree(package: Path) -> None:
 
 @each_package
 def test_imports_are_declared(package: Path) -> None:
-    locked = _locked_modules() | set(sys.stdlib_module_names)
+    known = _locked_modules() | set(sys.stdlib_module_names) | _declared(package) | {package.name}
     undeclared = {
         f'{name} ({path})'
         for name, path in _imported_modules(package / package.name).items()
-        if name not in locked | _declared(package) | {package.name}
+        if name not in known
     }
     assert not undeclared, 'neither in package.xml nor in pyproject.toml'
-
-
-@each_package
-def test_tests_import_only_declared_packages(package: Path) -> None:
-    imported = {
-        name for name in _imported_modules(package / 'test') if name.startswith('endoscope_')
-    }
-    assert imported <= _declared(package, 'test_depend') | {package.name}
+    imported = _imported_modules(package / 'test')
+    by_tests = {name for name in imported if name.startswith('endoscope_')}
+    assert by_tests <= _declared(package, 'test_depend') | {package.name}
 
 
 @each_package

@@ -2,16 +2,20 @@
 
 import importlib
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
+from multiprocessing import active_children
 from pathlib import Path
+from random import Random
 
 import pytest
 from node_program import code_of
 
 from endoscope_core.atomic_output import atomic_directory
+from endoscope_lab.faults.process_rig import ProcessRig
 from endoscope_nodes import program
 from endoscope_nodes.node_help import help_of
 from endoscope_nodes.program import NODES, words_for_nobody
@@ -23,11 +27,7 @@ PATIENCE_S = 120.0
 # The last bytes of a complete file: https://mcap.dev/spec.
 MCAP_MAGIC = b'\x89MCAP0\r\n'
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-WORDS = {
-    signal.SIGINT: 'interrupted',
-    signal.SIGTERM: 'terminated',
-    signal.SIGHUP: 'hung up',
-}
+WORDS = {signal.SIGINT: 'interrupted', signal.SIGHUP: 'hung up'}
 
 
 def start(name, *args, on_hangup=signal.SIG_DFL, environment=None, **options):
@@ -72,7 +72,7 @@ def wait_for_line(process, words):
 
 
 @pytest.mark.parametrize(
-    ('name', 'number'), list(zip(('graph', 'recorder', 'recorder'), STOPPING, strict=True))
+    ('name', 'number'), [('graph', signal.SIGINT), ('recorder', signal.SIGHUP)]
 )
 def test_a_signal_while_it_starts_is_one_line(tmp_path, name, number):
     process = start(name, '--ros-args', '-p', f'bag:={tmp_path / "bag"}')
@@ -154,19 +154,6 @@ def test_a_node_alone_says_what_it_waits_for():
     process.communicate(timeout=PATIENCE_S)
 
 
-@pytest.mark.parametrize(
-    ('name', 'args'),
-    [
-        ('master', ['--ros-args', '-p', 'source:=motion', '-h']),
-        ('graph', ['--ros-args', '-r', '__ns:=/left', '--', '--help']),
-    ],
-)
-def test_who_asks_for_help_gets_it_and_starts_nothing(name, args):
-    code, out, errors = ended(name, *args)
-    assert (code, errors) == (0, '')
-    assert out.startswith(f'usage: {name} ')
-
-
 @pytest.mark.parametrize('node', ['graph', *NODES])
 def test_help_tells_every_parameter(node):
     asked = program.graph if node == 'graph' else program.PROGRAMS[node]
@@ -182,16 +169,18 @@ def test_help_tells_every_parameter(node):
                 assert f'{parameter.allowed} {parameter.unit}'.strip() in told
 
 
-def test_help_loads_neither_ros_nor_anything_that_computes():
+def test_who_asks_for_help_gets_it_and_loads_neither_ros_nor_anything_that_computes():
     code = (
         'import sys\n'
-        'from endoscope_nodes.program import graph\n'
-        "graph(['--help'])\n"
+        'from endoscope_nodes.program import graph, master\n'
+        "graph(['--ros-args', '-r', '__ns:=/left', '--', '--help'])\n"
+        "master(['--ros-args', '-p', 'source:=motion', '-h'])\n"
         "heavy = {'rclpy', 'rcl_interfaces', 'numpy', 'numba', 'scipy', 'torch', 'yaml'}\n"
         'sys.exit(str(heavy & set(sys.modules)) if heavy & set(sys.modules) else 0)\n'
     )
     done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, '')
+    assert re.findall('(?m)^usage: (.*?) ', done.stdout) == ['graph', 'master']
 
 
 @pytest.mark.parametrize(
@@ -199,8 +188,7 @@ def test_help_loads_neither_ros_nor_anything_that_computes():
     [
         (['start'], "recorder: unknown argument 'start'; parameters go behind --ros-args"),
         (['--ros-args', '--log-levl', 'info'], "unknown ROS arguments '--log-levl', 'info'"),
-        (['--ros-args', '-p', 'recoder:autostart:=false'], "did you mean 'recorder'?"),
-        (['--ros-args', '--params-file', 'nowhere.yaml'], 'nowhere.yaml'),
+        (['--ros-args', '-p', 'keep:=-1.0'], "recorder: parameter 'keep' is -1.0"),
     ],
 )
 def test_words_that_nobody_would_hear_are_one_line_and_exit_code_2(tmp_path, args, words):
@@ -248,3 +236,17 @@ def healthcheck(node, environment):
         text=True,
         check=False,
     )
+
+
+@pytest.mark.parametrize('composed', [True, pytest.param(False, marks=pytest.mark.nightly)])
+def test_one_process_of_all_nodes_or_of_each_in_motion_stops_cleanly(tmp_path, composed):
+    with ProcessRig(100, composed, tmp_path, Random(1)) as rig:
+        rig.begin('motion')
+        assert rig.enable_and_move() is not None
+        for k, (name, pid) in enumerate(zip(rig.names, rig.processes.pids, strict=True)):
+            os.kill(pid, STOPPING[k % 2])
+            [process] = [p for p in active_children() if p.pid == pid]
+            process.join(PATIENCE_S)
+            assert process.exitcode == 0, (tmp_path / f'{name}.log').read_text()
+            assert 'Traceback' not in (tmp_path / f'{name}.log').read_text()
+    assert (rig.bag / 'metadata.yaml').is_file()

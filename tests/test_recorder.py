@@ -18,9 +18,8 @@ from recorded_session import (
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
-from std_srvs.srv import Trigger
 
-from endoscope_bags import BagError, open_bag
+from endoscope_bags import open_bag
 from endoscope_bags.cdr_encoding import encode_clock, encode_joint_state, encode_string
 from endoscope_bags.message_types import message_type
 from endoscope_nodes.nodes.recorder import new_bag
@@ -38,17 +37,15 @@ def recorded(tmp_path_factory):
     return sent, report, open_bag(path)
 
 
-def test_nothing_is_lost_and_the_report_says_so(recorded):
+def test_nothing_is_lost_the_report_says_so_and_the_content_is_what_was_sent(recorded):
     sent, report, bag = recorded
     assert report.complete, report
     for topic, messages in sent.items():
         assert bag.topics[topic].message_count == report.counts[topic] == len(messages)
     assert bag.topics[DIAGNOSTICS].message_count >= 1
     assert not any(report.lost.values())
-
-
-def test_the_content_is_what_was_sent(recorded):
-    sent, _, bag = recorded
+    # Latched, and from before the start.
+    assert [message.data for _, message in bag.decoded(STATE)] == ['ENABLED']
     servo = bag.joint_state('motor/servo_jp')
     np.testing.assert_array_equal(servo.stamp_ns, [stamp for stamp, _ in sent[SERVO]])
     np.testing.assert_array_equal(servo.position, [values for _, values in sent[SERVO]])
@@ -72,11 +69,6 @@ def test_times_and_numbers_are_those_of_the_middleware(recorded):
     np.testing.assert_array_equal(times.sequence, np.arange(1, N + 1))
 
 
-def test_a_latched_state_from_before_the_start_is_there(recorded):
-    _, _, bag = recorded
-    assert [message.data for _, message in bag.decoded(STATE)] == ['ENABLED']
-
-
 def test_the_offered_qos_is_written_down(recorded):
     _, _, bag = recorded
     assert [(q.reliability, q.durability) for q in bag.topics[STATE].qos] == [
@@ -89,36 +81,15 @@ def test_the_offered_qos_is_written_down(recorded):
         assert topic.type_hash == message_type(topic.type).type_hash
 
 
-def test_start_and_stop_by_service(tmp_path):
-    first = tmp_path / 'first'
-    with RecordedSession(bag=str(first), autostart=False, topics=[SERVO]) as session:
-        start = session.probe.create_client(Trigger, 'recorder/start')
-        stop = session.probe.create_client(Trigger, 'recorder/stop')
-        session.wait(lambda: start.service_is_ready() and stop.service_is_ready())
-
-        def call(client):
-            future = client.call_async(Trigger.Request())
-            session.wait(future.done)
-            return future.result().success, future.result().message
-
-        assert call(stop) == (False, 'not recording')
-        assert call(start) == (True, str(first))
-        success, message = call(start)
-        assert not success
-        assert 'already recording to' in message
-        success, message = call(stop)
-        assert success
-        assert message == f'{first}: 0 messages, 0 lost'
-        success, message = call(start)
-        assert not success
-        assert 'exists already' in message
-    assert session.runtime.exit_code == 0
-
-
-def test_a_place_that_is_taken_is_refused_before_anything_starts(tmp_path):
-    (tmp_path / 'bag').mkdir()
-    with pytest.raises(ParameterError, match=r"recorder: parameter 'bag': .*exists already"):
-        RecordedSession(bag=str(tmp_path / 'bag'))
+@pytest.mark.parametrize(
+    ('given', 'message'),
+    [({}, "'bag': .*exists already"), ({'topics': ['3 x']}, "'topics': '3 x' is not a topic name")],
+)
+def test_what_cannot_be_recorded_is_refused_before_anything_starts(tmp_path, given, message):
+    (tmp_path / 'bag').mkdir(exist_ok=True)
+    bag = tmp_path / ('bag' if not given else 'other')
+    with pytest.raises(ParameterError, match=f'recorder: parameter {message}'):
+        RecordedSession(bag=str(bag), **given)
 
 
 def test_other_topics_are_recorded_once_their_type_is_known(tmp_path):
@@ -178,13 +149,6 @@ def test_simulated_time_is_recorded_the_same_twice(tmp_path):
     np.testing.assert_array_equal(series.publish_ns, series.stamp_ns)
     states = [(m.log_ns // MS - 1000, s.data) for m, s in bags[0].decoded(STATE)]
     assert states == [(5, 'state 5'), (25, 'state 25'), (45, 'state 45')]
-
-
-def test_stopping_without_a_recording_is_an_error(tmp_path):
-    session = RecordedSession(bag=str(tmp_path / 'bag'), autostart=False)
-    with session, pytest.raises(BagError, match='not recording'):
-        session.recorder.stop()
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_recordings_without_a_name_have_different_ones_within_a_second(tmp_path, monkeypatch):

@@ -75,7 +75,6 @@ def test_two_senders_of_a_motion_topic_are_a_fault_that_names_both():
         for topic, names, value in (
             (SLAVE_COMMAND, JOINTS, 0.5),
             (CORRECTION, JOINTS, 2.0),
-            (CORRECTION, JOINTS, 1e9),
             (CORRECTION, JOINTS, math.nan),
             (MOTOR_COMMAND, MOTORS, 0.5),
         ):
@@ -214,39 +213,22 @@ def test_a_result_that_outlives_its_sender_is_not_taken(reader):
         assert CALIBRATION_RESULT in graph.cause
 
 
-@pytest.mark.parametrize('session', ['', 'session-99'])
-def test_a_rival_of_the_supervisor_moves_nothing(session):
-    with run() as graph:
-        graph.set('master', source='motion')
+def test_a_rival_of_the_supervisor_moves_nothing():
+    with run(overrides={'master': {'source': 'motion'}}) as graph:
         graph.command('disable')
         graph.advance(0.5)
         moved = Moved(graph)
         states = graph.speak(String, OPERATING_STATE, RESULT)
         sessions = graph.speak(Header, MOTION_SESSION, EVENT)
-        for _ in range(300):
+        for k in range(300):
             states.publish(String(data='ENABLED'))
-            if session:
-                sessions.publish(Header(frame_id=session))
+            if k > 150:
+                sessions.publish(Header(frame_id='session-99'))
             graph.advance(0.005)
         assert moved.goals == []
         assert moved.of_shafts < STILL
         causes = '; '.join(graph.nodes['supervisor'].machine.present_causes.values())
         assert '/endoscope/probe and /endoscope/supervisor' in causes
-
-
-def test_a_result_of_somebody_else_changes_nothing():
-    with run() as graph:
-        graph.set('master', source='motion')
-        graph.advance(2.0)
-        result = DiagnosticArray()
-        result.header.frame_id = graph.session
-        result.status = [status('calibration: hysteresis class', OK, '', {'class_deg': 100})]
-        publisher = graph.speak(DiagnosticArray, CALIBRATION_RESULT, RESULT)
-        publisher.publish(result)
-        graph.advance(0.5)
-        assert graph.nodes['compensator'].findings is None
-        assert graph.state == 'FAULT'
-        assert CALIBRATION_RESULT in graph.cause
 
 
 def test_health_of_another_rig_is_not_ours():
@@ -270,27 +252,6 @@ def test_health_of_another_rig_is_not_ours():
 
 
 # ---- nodes that vanish and come back
-
-
-def test_a_dead_supervisor_stops_the_motion_within_a_fifth_of_a_second():
-    with run() as graph:
-        graph.set('master', source='motion')
-        graph.advance(2.0)
-        moved = Moved(graph)
-        graph.kill('supervisor')
-        graph.advance(1.0)
-        assert len(moved.goals) <= 200
-        moved.clear()
-        graph.advance(1.0)
-        assert moved.of_shafts < STILL
-        graph.start('supervisor')
-        graph.advance(0.5)
-        assert graph.state == 'DISABLED'
-        assert moved.goals == []
-        graph.enable()
-        graph.advance(1.0)
-        assert len(moved.goals) > 0.9 * TICK_RATE
-        assert moved.largest_step < BOUND
 
 
 def test_a_node_started_anew_needs_another_enable():
@@ -335,20 +296,3 @@ def test_a_calibration_node_started_anew_is_believed_after_another_enable():
         graph.enable()
         graph.advance(0.5)
         assert graph.nodes['compensator'].findings is None
-
-
-def test_a_tracker_that_comes_back_moves_nothing():
-    with run(overrides={'calibration': {'motion': 'brief'}}) as graph:
-        graph.calibrate()
-        handle = Handle(graph)
-        graph.set('master', source='master')
-        handle.move(2.0, (0.4, 0.3))
-        handle.move(0.5)
-        moved = Moved(graph)
-        graph.kill('em_tracker')
-        handle.move(1.5)
-        graph.start('em_tracker')
-        handle.move(2.0)
-        assert graph.state == 'ENABLED'
-        assert moved.largest_step < BOUND
-        assert moved.of_tip < 0.05

@@ -6,6 +6,7 @@ the slave took, which `ros_ws/doc/device_faults_sensors.md` tabulates; nothing i
 
 import time
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -206,16 +207,11 @@ def test_load_cells_that_are_unplugged(rig):
 
 
 def test_replies_that_all_come_late(rig):
-    def late(data):
-        return [(0.07, data)]
+    def delay(seconds):
+        rig.cable.to_host = lambda data: [(seconds, data)]
 
-    def begin():
-        rig.cable.to_host = late
-
-    def end():
-        rig.cable.to_host = lambda data: [(0.0, data)]
-
-    fault(rig, 'late replies', [SILENT, 'no reply', 'malformed'], begin, end)
+    causes = [SILENT, 'no reply', 'malformed']
+    fault(rig, 'late replies', causes, lambda: delay(0.07), lambda: delay(0.0))
 
 
 def test_flipped_bits_stop_nothing_and_become_no_number(rig):
@@ -370,37 +366,23 @@ def test_the_bag_shows_it_all(rig):
         assert words in said
 
 
-class NetworkRig:
-    """Load cells at a Modbus TCP server that can be switched off."""
-
-    def __init__(self, folder):
-        self.cells = Cells()
-        self.server = transmitter(self.cells)
-        self.graph = SensorGraph(
-            folder / 'bag',
-            cells=self.cells,
-            load_cells={
-                'device': 'modbus_tcp',
-                'port': f'127.0.0.1:{self.server.tcp_port}',
-                'calibration_file': str(write_calibration(folder)),
-            },
-        )
-
-    def switch_on(self):
-        self.server = transmitter(self.cells, tcp_port=self.server.tcp_port)
-
-    def close(self):
-        try:
-            self.graph.close()
-        finally:
-            self.server.close()
-
-
 def test_a_modbus_server_that_dies(tmp_path):
-    rig = NetworkRig(tmp_path)
-    try:
-        rig.graph.enable()
-        rig.graph.play()
-        fault(rig, 'dead Modbus server', ['127.0.0.1'], rig.server.close, rig.switch_on)
-    finally:
-        rig.close()
+    cells = Cells()
+    servers = [transmitter(cells)]
+    port = servers[0].tcp_port
+    load_cells = {
+        'device': 'modbus_tcp',
+        'port': f'127.0.0.1:{port}',
+        'calibration_file': str(write_calibration(tmp_path)),
+    }
+    with SensorGraph(tmp_path / 'bag', cells=cells, load_cells=load_cells) as graph:
+        graph.enable()
+        graph.play()
+        fault(
+            SimpleNamespace(graph=graph),
+            'dead Modbus server',
+            ['127.0.0.1'],
+            servers[0].close,
+            lambda: servers.append(transmitter(cells, tcp_port=port)),
+        )
+    servers[-1].close()

@@ -12,39 +12,36 @@ from endoscope_nodes.runtime.runtime import Runtime
 
 
 @pytest.mark.parametrize(
-    ('overrides', 'words'),
+    ('factory', 'overrides', 'words'),
     [
-        ({'device': 'modbus_rtu'}, "'port' is empty"),
-        ({'device': 'modbus_rtu', 'port': '/dev/null'}, "'calibration_file' is empty"),
+        (LoadCellsNode, {'device': 'modbus_rtu'}, "'port' is empty"),
+        (LoadCellsNode, {'device': 'modbus_rtu', 'port': 'p'}, "'calibration_file' is empty"),
         (
-            {'device': 'modbus_tcp', 'port': 'h:x', 'calibration_file': 'CELLS'},
+            LoadCellsNode,
+            {'device': 'modbus_tcp', 'port': 'h:x', 'calibration_file': 'cells.yaml'},
             "'h:x' is not an address",
         ),
-        ({'device': 'modbus_rtu', 'port': 'p', 'calibration_file': 'nowhere'}, 'nowhere'),
-        ({'device': 'modbus'}, 'did you mean modbus_'),
+        (
+            LoadCellsNode,
+            {'device': 'modbus_rtu', 'port': 'p', 'calibration_file': 'nowhere'},
+            'nowhere',
+        ),
+        (LoadCellsNode, {'device': 'modbus'}, 'did you mean modbus_'),
+        (EmTrackerNode, {'device': 'aurora'}, "'port' is empty"),
+        (
+            EmTrackerNode,
+            {'device': 'aurora', 'port': 'p', 'registration_file': 'bad.yaml'},
+            'orientation is missing',
+        ),
+        (EmTrackerNode, {'device': 'polaris'}, 'aurora'),
     ],
 )
-def test_parameters_of_real_cells_are_checked(tmp_path, overrides, words):
-    if overrides.get('calibration_file') == 'CELLS':
-        overrides = overrides | {'calibration_file': str(write_calibration(tmp_path))}
+def test_parameters_of_real_sensors_are_checked(tmp_path, monkeypatch, factory, overrides, words):
+    monkeypatch.chdir(tmp_path)
+    write_calibration(tmp_path)
+    (tmp_path / 'bad.yaml').write_text('position: [0, 0, 0]')
     with pytest.raises(ParameterError, match=words):
-        start(['--ros-args', '--log-level', 'fatal'], LoadCellsNode, overrides)
-
-
-@pytest.mark.parametrize(
-    ('overrides', 'words'),
-    [
-        ({'device': 'aurora'}, "'port' is empty"),
-        ({'device': 'aurora', 'port': 'p', 'registration_file': 'BAD'}, 'orientation is missing'),
-        ({'device': 'polaris'}, 'aurora'),
-    ],
-)
-def test_parameters_of_a_real_tracker_are_checked(tmp_path, overrides, words):
-    if 'registration_file' in overrides:
-        (tmp_path / 'bad.yaml').write_text('position: [0, 0, 0]')
-        overrides = overrides | {'registration_file': str(tmp_path / 'bad.yaml')}
-    with pytest.raises(ParameterError, match=words):
-        start(['--ros-args', '--log-level', 'fatal'], EmTrackerNode, overrides)
+        start(['--ros-args', '--log-level', 'fatal'], factory, overrides)
 
 
 @pytest.mark.parametrize(
