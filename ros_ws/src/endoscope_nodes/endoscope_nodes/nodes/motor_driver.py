@@ -18,7 +18,7 @@ from endoscope_nodes import names
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
-from endoscope_nodes.runtime.node_parameters import DynamixelParameters, MotorDriverParameters
+from endoscope_nodes.runtime.device_parameters import DynamixelParameters, MotorDriverParameters
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import COMMAND, LOCK_STEP, RESULT, SENSOR_OFFERED
 from endoscope_nodes.runtime.streams import JointPublisher, JointSample, JointSubscription
