@@ -7,13 +7,8 @@ from outside_data import CASES, needs
 from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
 
-from endoscope_lab.concealed.sliding_nodes import (
-    NOMINAL,
-    follow,
-    motor_angle,
-    move_wire,
-    simulate,
-)
+from endoscope_lab.concealed.sliding_nodes import NOMINAL, follow, motor_angle, simulate
+from endoscope_lab.concealed.sliding_wire import move_wire
 
 REFERENCE = CASES / 'sheath' / 'reference'
 
