@@ -45,7 +45,6 @@ class Controls:
 
     @property
     def operator(self) -> Client | None:
-        """Who operates."""
         return self.holder.client if self.lease.holder else None
 
     def hear(self, client: Client, frame: InputFrame, arrived_ns: int) -> None:

@@ -55,19 +55,15 @@ class Passing:
     def __init__(self, travel: float) -> None:
         self._travel = travel
         self._desired = 0.0
-        self._direction = 0.0
-
-    @property
-    def direction(self) -> float:
-        return self._direction
+        self.direction = 0.0
 
     def begin(self, direction: float, desired: float, velocity: float) -> float:
-        self._direction, self._desired = direction, desired
+        self.direction, self._desired = direction, desired
         return desired
 
     def wanted(self, desired: float, velocity: float, dt: float) -> float:
         moved = desired - self._desired
-        self._direction = float(dahl_step(self._direction, moved, self._travel, 1.0))
+        self.direction = float(dahl_step(self.direction, moved, self._travel, 1.0))
         self._desired = desired
         return desired
 

@@ -27,5 +27,4 @@ class Beside:
         return done
 
     def close(self) -> None:
-        """Wait for the end of what is computed."""
         self._thread.shutdown()
