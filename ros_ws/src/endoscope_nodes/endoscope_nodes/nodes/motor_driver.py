@@ -111,7 +111,6 @@ class MotorDriverNode(EndoscopeNode):
 
     @property
     def announcement(self) -> str:
-        """Name the device."""
         return f'motors {self._device_name}'
 
     def _describe_rig(self, context: NodeContext) -> RigKind:
@@ -238,7 +237,6 @@ class MotorDriverNode(EndoscopeNode):
         return OK, 'holding' if self.motion.holding else 'following commands', values
 
     def close(self) -> None:
-        """Let go of the device."""
         self._device.close()
 
 
