@@ -23,7 +23,8 @@ from endoscope_explain.report.writing import KEYS
 from endoscope_nodes import program
 from endoscope_nodes.runtime.node_parameters import OF_NODE, OF_PROCESS
 from endoscope_nodes.runtime.parameters import described
-from endoscope_nodes.topics import SERVICES, TOPICS
+from endoscope_nodes.services import SERVICES
+from endoscope_nodes.topics import TOPICS
 
 ENDOSCOPE = {*COMMANDS, *commands_of_other_packages()}
 API = {

@@ -71,7 +71,7 @@ def test_every_mode_comes_in_while_moving_without_a_jump(tmp_path):
         graph.enable()
         graph.calibrate()
         node = graph.nodes['compensator']
-        assert node._compiled == {'bouc_wen'}
+        assert node._feedforward._compiled == {'bouc_wen'}
         assert len(node.findings.plants) == 2
         graph.set('master', source='motion')
         graph.advance(2.0)
@@ -82,7 +82,7 @@ def test_every_mode_comes_in_while_moving_without_a_jump(tmp_path):
             graph.set('compensator', mode=mode)
             graph.advance(0.02)
             assert node._feedforward.law.mode == mode
-            assert mode in node._compiled
+            assert mode in node._feedforward._compiled
             steps = np.abs(np.diff([s.position for s in drives], axis=0))
             assert len(drives) >= 0.02 * TICK_RATE
             # 20 rad/s at the joint is what the feed-forward allows itself; a jump would be 0.1 rad.

@@ -12,7 +12,8 @@ from endoscope_nodes.runtime.private_domain import private_domain
 from endoscope_nodes.runtime.qos import profile
 from endoscope_nodes.runtime.recorded_topics import message_class
 from endoscope_nodes.runtime.runtime import Runtime
-from endoscope_nodes.topics import BY_NAME, SERVICES, TOPICS
+from endoscope_nodes.services import SERVICES
+from endoscope_nodes.topics import BY_NAME, TOPICS
 
 NAMESPACE = '/endoscope/'
 OF_EVERY_NODE = {'/rosout', '/parameter_events', '/clock', '/diagnostics'}

@@ -31,7 +31,8 @@ from endoscope_explain.report.writing import KEYS
 from endoscope_nodes import program
 from endoscope_nodes.runtime.node_parameters import OF_NODE, OF_PROCESS
 from endoscope_nodes.runtime.parameters import Described, as_typed, described
-from endoscope_nodes.topics import RECORDED, SERVICES, TOPICS, TRIGGER, Qos, Topic
+from endoscope_nodes.services import SERVICES, TRIGGER
+from endoscope_nodes.topics import RECORDED, TOPICS, Qos, Topic
 
 PAGES = sorted(Path(__file__).parent.rglob('*.md'))
 WIDTH = 100

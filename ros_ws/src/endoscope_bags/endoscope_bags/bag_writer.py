@@ -18,10 +18,9 @@ from endoscope_bags.metadata import (
     TopicSummary,
     metadata_document,
     metadata_text,
-    write_metadata,
 )
 from endoscope_bags.topic import QosProfile
-from endoscope_core.atomic_output import make_parent
+from endoscope_core.atomic_output import make_parent, write_text
 
 CHUNK_SECONDS = 0.25
 CHUNK_BYTES = 1 << 20
@@ -326,7 +325,7 @@ class BagWriter:
         self._sink.finish({**records, 'rosbag2': {'serialized_metadata': metadata_text(document)}})
         try:
             if not self._bare:
-                write_metadata(self._home / METADATA, document)
+                write_text(self._home / METADATA, metadata_text(document))
         except OSError as error:
             raise write_error(error, str(self._home / METADATA)) from error
         if self._home != self.path:

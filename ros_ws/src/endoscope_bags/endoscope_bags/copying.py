@@ -1,5 +1,6 @@
 """New recordings out of old ones: a stretch with what was in force then, or what is sound."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -49,24 +50,16 @@ def cut(source: str | Path, target: str | Path, begin: float, end: float | None)
     # then would have heard it; its receipt is the beginning of the stretch.
     in_force: dict[str, RawMessage] = {}
     with BagWriter(target, records=copied_records(recording)) as writer:
-        for topic in recording.topics.values():
-            kind = MessageType(topic.type, topic.definition, topic.type_hash)
-            writer.add_topic(topic.name, kind, topic.qos)
-
-        def write(message: RawMessage, log_ns: int) -> None:
-            kind = recording.topics[message.topic].type
-            times = (log_ns, message.publish_ns, message.sequence)
-            writer.write_raw(message.topic, kind, message.data, *times)
-
+        write = _copier(recording, writer)
         for message in recording.messages(sorted(latched)):
             if message.log_ns < first_ns:
                 in_force[message.topic] = message
         for message in in_force.values():
-            write(message, first_ns)
+            write(message._replace(log_ns=first_ns))
         numbers = {topic: SequenceGaps() for topic in losses_told(recording)}
         for message in recording.messages():
             if first_ns <= message.log_ns <= last_ns:
-                write(message, message.log_ns)
+                write(message)
                 if message.topic in numbers:
                     numbers[message.topic].add(message.sequence)
         count = writer.message_count - len(in_force)
@@ -100,7 +93,9 @@ def recover(source: str | Path, target: str | Path) -> RecoveryReport:
     """Write all messages of the sound chunks of a recording to a new one; on an error to none."""
     recording = open_bag(source, salvage=True)
     with BagWriter(target, records=copied_records(recording)) as writer:
-        _copy(recording, writer)
+        write = _copier(recording, writer)
+        for message in recording.stored_messages():
+            write(message)
         damage = {f'damage_{n}': what for n, what in enumerate(recording.damage, start=1)}
         writer.close({'recovered_from': Path(source).name, **damage})
         counts = writer.counts
@@ -109,17 +104,15 @@ def recover(source: str | Path, target: str | Path) -> RecoveryReport:
     )
 
 
-def _copy(recording: Recording, writer: BagWriter) -> None:
+def _copier(recording: Recording, writer: BagWriter) -> Callable[[RawMessage], None]:
+    """Announce all topics of a recording; what writes a message of it."""
     for topic in recording.topics.values():
         kind = MessageType(topic.type, topic.definition, topic.type_hash)
         writer.add_topic(topic.name, kind, topic.qos)
-    for message in recording.stored_messages():
-        kind_name = recording.topics[message.topic].type
-        writer.write_raw(
-            message.topic,
-            kind_name,
-            message.data,
-            message.log_ns,
-            message.publish_ns,
-            message.sequence,
-        )
+
+    def write(message: RawMessage) -> None:
+        times = (message.log_ns, message.publish_ns, message.sequence)
+        kind = recording.topics[message.topic].type
+        writer.write_raw(message.topic, kind, message.data, *times)
+
+    return write

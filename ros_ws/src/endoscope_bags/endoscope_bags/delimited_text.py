@@ -8,7 +8,7 @@ import math
 import re
 import shlex
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime, time
 from decimal import Decimal, InvalidOperation
@@ -76,7 +76,6 @@ class DelimitedText:
                 raise BagError(f'{self.path}: line {line}: {error}') from error
 
     def cells(self, index: int) -> list[str]:
-        """Return the texts of a column."""
         cells = []
         for line, row in self.rows():
             if len(row) <= index:
@@ -103,9 +102,9 @@ class DelimitedText:
 
     def _no_number(self, line: int, index: int, cell: str) -> BagError:
         hint = ''
-        if is_number(cell.replace(',', '.')):
+        if reads_as(float, cell.replace(',', '.')):
             hint = ': decimal_comma: true in the mapping reads it'
-        elif is_date(cell):
+        elif reads_as(date_ns, cell):
             hint = ': unit: date in the mapping reads it'
         return BagError(
             f'{self.path}: line {line}, {self.label(index)}: {_shown(cell)} is not a number{hint}'
@@ -167,19 +166,10 @@ def date_ns(text: str) -> int:
     return (since.days * 86400 + since.seconds) * 10**9 + ns
 
 
-def is_number(cell: str) -> bool:
-    """Tell whether a cell reads as a number (NaN and infinity are some)."""
+def reads_as(read: Callable[[str], object], cell: str) -> bool:
+    """Tell whether a cell reads as a number (`float`: NaN is one) or as a date (`date_ns`)."""
     try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
-
-
-def is_date(cell: str) -> bool:
-    """Tell whether a cell reads as a date and time, or as a time of day."""
-    try:
-        date_ns(cell)
+        read(cell)
     except ValueError:
         return False
     return True
@@ -204,7 +194,9 @@ def read_table(
         separator = _separator(path, text[first if header_lines is None else header_lines :])
     if header_lines is None:
         cells = [cell.replace(',', '.') for cell in _cut(text[first], separator) if cell]
-        header_lines = first + (not all(is_number(cell) or is_date(cell) for cell in cells))
+        header_lines = first + (
+            not all(reads_as(float, cell) or reads_as(date_ns, cell) for cell in cells)
+        )
     above = [line for line in text[:header_lines] if line.strip()]
     lines = array(
         'q',

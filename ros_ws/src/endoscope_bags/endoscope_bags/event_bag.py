@@ -99,7 +99,6 @@ class EventBag:
 
     @property
     def kind(self) -> str:
-        """Of the first event."""
         return self.events[0].kind
 
     @property

@@ -15,7 +15,6 @@ import yaml
 from endoscope_bags.errors import BagError, BagNotFoundError
 from endoscope_bags.message_types import MessageType
 from endoscope_bags.topic import QosProfile
-from endoscope_core.atomic_output import write_text
 from endoscope_core.errors import FileError
 from endoscope_core.schema import load_yaml
 
@@ -151,15 +150,5 @@ def metadata_document(
 
 
 def metadata_text(document: Mapping[str, Any]) -> str:
-    """Return the document as YAML without anchors, which yaml-cpp would print otherwise."""
-    return yaml.dump(dict(document), Dumper=_PlainDumper, sort_keys=False)
-
-
-def write_metadata(path: Path, document: Mapping[str, Any]) -> None:
-    """Write `metadata.yaml` whole or not at all."""
-    write_text(path, metadata_text(document))
-
-
-class _PlainDumper(yaml.SafeDumper):
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
+    """Return the document, in which no part stands twice: yaml-cpp reads no anchors."""
+    return yaml.safe_dump(dict(document), sort_keys=False)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,7 @@ from endoscope_bags.joint_state_series import (
 from endoscope_bags.mcap_scan import McapScan, scan_mcap
 from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED, typestore
 from endoscope_bags.metadata import bag_files
+from endoscope_bags.stored_messages import StoredMessages
 from endoscope_bags.topic import MessageTimes, QosProfile, RawMessage, Topic, qos_from_yaml
 from endoscope_core.errors import FileError
 from endoscope_core.rig import Rig, rig_as_text, rig_from_text, shipped_rig
@@ -46,31 +47,6 @@ def _naming(path: Path) -> Iterator[None]:
         if str(path) in str(error):
             raise
         raise type(error)(f'{path}: {error}') from error
-
-
-class _Block(NamedTuple):
-    """A chunk, decompressed, and where in it the messages of some topics are (by their number)."""
-
-    data: bytes
-    topic: IntArray
-    start: IntArray
-    size: IntArray
-    log_ns: IntArray
-    publish_ns: IntArray
-    sequence: IntArray
-
-
-def _rows_of_topics(scan: McapScan) -> dict[str, IntArray]:
-    """For each topic of a file the rows of its messages in the file's table."""
-    names = list(dict.fromkeys(channel.topic for channel in scan.channels.values()))
-    numbers = {name: k for k, name in enumerate(names)}
-    of_channel = np.zeros(1 << 16, dtype=np.int64)
-    for channel in scan.channels.values():
-        of_channel[channel.id] = numbers[channel.topic]
-    topic = of_channel[scan.messages.channel]
-    order = np.argsort(topic, kind='stable')
-    bounds = np.searchsorted(topic[order], np.arange(1, len(names)))
-    return dict(zip(names, np.split(order, bounds), strict=bool(names)))
 
 
 class Recording:
@@ -96,18 +72,13 @@ class Recording:
         self.library = scans[0].header.library
         self.metadata = {k: v for scan in scans for k, v in scan.metadata.items()}
         self.damage = tuple(f'{s.path.name}: {what}' for s in scans for what in s.damage)
-        self._scans = tuple(scans)
-        # For each file, the rows of each topic in its table of messages.
-        self._rows: list[dict[str, IntArray]] = []
+        self._stored = StoredMessages(scans)
         self.topics: dict[str, Topic] = {}
         self._qos: dict[str, tuple[QosProfile, ...]] = {}
-        for scan in scans:
-            self._add(scan)
+        for scan, rows in zip(scans, self._stored.rows, strict=True):
+            self._add(scan, dict(rows))
 
-    def _add(self, scan: McapScan) -> None:
-        rows = _rows_of_topics(scan)
-        uncounted = dict(rows)
-        self._rows.append(rows)
+    def _add(self, scan: McapScan, uncounted: dict[str, IntArray]) -> None:
         definitions = {n: s.data.decode(errors='replace') for n, s in scan.schemas.items()}
         for channel in scan.channels.values():
             schema = scan.schemas.get(channel.schema_id)
@@ -150,15 +121,12 @@ class Recording:
     @property
     def start_ns(self) -> int:
         """First receipt, ns since the epoch."""
-        return min(int(t.min()) for t in self._all_log_ns())
+        return min(int(t.min()) for t in self._stored.log_ns())
 
     @property
     def end_ns(self) -> int:
         """Last receipt, ns since the epoch."""
-        return max(int(t.max()) for t in self._all_log_ns())
-
-    def _all_log_ns(self) -> Iterator[IntArray]:
-        return (scan.messages.log_ns for scan in self._scans if len(scan.messages))
+        return max(int(t.max()) for t in self._stored.log_ns())
 
     def find(self, suffix: str, namespace: str | None = None) -> str:
         """Return the full name of the topic `suffix` under whatever namespace.
@@ -263,36 +231,11 @@ class Recording:
 
     def times(self, topic: str) -> MessageTimes:
         """Return receipt, publication and counter of the messages of a full topic name."""
-        parts = [
-            (scan.messages, rows[topic])
-            for scan, rows in zip(self._scans, self._rows, strict=True)
-            if topic in rows
-        ]
-        return MessageTimes(
-            *(
-                np.concatenate([getattr(messages, key)[index] for messages, index in parts])
-                for key in ('log_ns', 'publish_ns', 'sequence')
-            )
-        )
+        return self._stored.times(topic)
 
     def payloads(self, topic: str) -> Payloads:
         """Return the bytes of the messages of a full topic name, as recorded."""
-        return self._payloads([topic])[0]
-
-    def _payloads(self, topics: Sequence[str]) -> list[Payloads]:
-        content = [bytearray() for _ in topics]
-        sizes: list[list[int]] = [[] for _ in topics]
-        for block in self._blocks(topics):
-            ends = block.start + block.size
-            rows = zip(block.topic.tolist(), block.start.tolist(), ends.tolist(), strict=True)
-            for topic, start, end in rows:
-                content[topic] += block.data[start:end]
-                sizes[topic].append(end - start)
-        arrays = [np.array(each, dtype=np.int64) for each in sizes]
-        return [
-            Payloads(bytes_, np.cumsum(size) - size, size)
-            for bytes_, size in zip(content, arrays, strict=True)
-        ]
+        return self._stored.payloads([topic])[0]
 
     def header_stamps(self, topics: Sequence[str]) -> list[IntArray]:
         """Return the header stamps in ns, each (N,), of topics whose messages begin with a header.
@@ -304,7 +247,7 @@ class Recording:
         """
         heads = [
             (block.topic[long], stamps_of_heads(block.data, block.start[long]))
-            for block in self._blocks(topics)
+            for block in self._stored.blocks(topics)
             for long in [block.size >= HEAD_WITH_STAMP]
         ]
         topic = np.concatenate([t for t, _ in heads] or [np.empty(0, np.int64)])
@@ -325,7 +268,7 @@ class Recording:
         if not chosen:
             return
         times = [self.times(topic) for topic in chosen]
-        payloads = self._payloads(chosen)
+        payloads = self._stored.payloads(chosen)
         which = np.repeat(np.arange(len(chosen)), [len(t.log_ns) for t in times])
         row = np.concatenate([np.arange(len(t.log_ns)) for t in times])
         log_ns = np.concatenate([t.log_ns for t in times])
@@ -342,30 +285,13 @@ class Recording:
     def stored_messages(self) -> Iterator[RawMessage]:
         """Yield all messages as they are stored, chunk by chunk, which needs little memory."""
         topics = list(self.topics)
-        for block in self._blocks(topics):
+        for block in self._stored.blocks(topics):
             columns = (block.topic, block.log_ns, block.publish_ns, block.sequence)
             ends = block.start + block.size
             rows = zip(*(c.tolist() for c in (*columns, block.start, ends)), strict=True)
             for topic, log_ns, publish_ns, sequence, start, end in rows:
                 data = block.data[start:end]
                 yield RawMessage(topics[topic], log_ns, publish_ns, sequence, data)
-
-    def _blocks(self, topics: Sequence[str]) -> Iterator['_Block']:
-        """Read each chunk that holds messages of these topics once."""
-        for scan, rows in zip(self._scans, self._rows, strict=True):
-            parts = [rows.get(topic, np.empty(0, np.int64)) for topic in topics]
-            index = np.concatenate([*parts, np.empty(0, np.int64)])
-            in_file_order = np.argsort(index, kind='stable')
-            index = index[in_file_order]
-            topic = np.repeat(np.arange(len(parts)), [len(p) for p in parts])[in_file_order]
-            m = scan.messages
-            numbers, first = np.unique(m.block[index], return_index=True)
-            ends = np.append(first, len(index))[1:]
-            spans = zip(first, ends, scan.block_data(numbers), strict=True)
-            for begin, end, (_, data) in spans:
-                i = index[begin:end]
-                columns = (m.start[i], m.size[i], m.log_ns[i], m.publish_ns[i], m.sequence[i])
-                yield _Block(data, topic[begin:end], *columns)
 
     def decoded(self, topic: str) -> Iterator[tuple[RawMessage, Any]]:
         """Yield the messages of a full topic name, each with its object, of whatever type.

@@ -39,12 +39,10 @@ class SessionReport:
 
     @property
     def message_count(self) -> int:
-        """Messages recorded."""
         return sum(self.counts.values())
 
     @property
     def lost_count(self) -> int:
-        """Messages lost."""
         return sum(self.lost.values())
 
     @property
@@ -86,19 +84,13 @@ class RecordingSession:
         first = ({} if rig is None else rig_record(rig)) | dict(records or {})
         self._writer = BagWriter(path, atomic=False, threaded=threaded, records=first)
         self._sources: list[_Source] = []
-        self._full = ''
+        self.full = ''  # why it has ended early
         self._ended = 'on request'
         self._more_notes: Mapping[str, str] = {}
 
     @property
     def path(self) -> Path:
-        """The recording."""
         return self._writer.path
-
-    @property
-    def full(self) -> str:
-        """Why it has ended early; else empty."""
-        return self._full
 
     def add_topic(
         self,
@@ -118,7 +110,7 @@ class RecordingSession:
         for received_ns, number, sequence, published_ns, data in sorted(batch):
             source = self._sources[number]
             source.gaps.add(sequence, source.count_publishers)
-            if self._full:
+            if self.full:
                 continue
             try:
                 if not source.announced:
@@ -136,7 +128,7 @@ class RecordingSession:
     def flush_stale(self, now_ns: int) -> None:
         """Hand a chunk to the operating system that no later message has closed by `now_ns`."""
         waiting_since = self._writer.waiting_since_ns
-        if self._full or waiting_since is None or now_ns - waiting_since < _STALE_CHUNK_NS:
+        if self.full or waiting_since is None or now_ns - waiting_since < _STALE_CHUNK_NS:
             return
         try:
             self._writer.flush()
@@ -145,7 +137,7 @@ class RecordingSession:
 
     def _end_full(self, error: BagWriteError) -> None:
         # What was recorded is finished at once; what still arrives is counted as lost.
-        self._full = str(error)
+        self.full = str(error)
         self._finish()
 
     def _finish(self) -> None:
@@ -153,14 +145,14 @@ class RecordingSession:
         try:
             self._writer.settle()
         except BagWriteError as error:
-            self._full = str(error)
+            self.full = str(error)
         try:
             self._writer.close(self._notes())
         except BagWriteError as error:
-            self._full = str(error)
+            self.full = str(error)
 
     def _notes(self) -> dict[str, str]:
-        notes = {'ended': self._full or self._ended, **self._more_notes}
+        notes = {'ended': self.full or self._ended, **self._more_notes}
         return notes | {
             f'{LOST_PREFIX}{source.topic}': str(source.gaps.lost) for source in self._sources
         }
@@ -171,7 +163,7 @@ class RecordingSession:
         counts = {s.topic: written.get(s.topic, 0) for s in self._sources}
         lost = {s.topic: s.gaps.lost + s.gaps.received - counts[s.topic] for s in self._sources}
         return SessionReport(
-            self.path, counts, lost, self._full, self._writer.finished or not self._writer.closed
+            self.path, counts, lost, self.full, self._writer.finished or not self._writer.closed
         )
 
     def close(

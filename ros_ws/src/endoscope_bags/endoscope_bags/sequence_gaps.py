@@ -7,11 +7,6 @@ _MOST_PUBLISHERS = 64
 _MOST_GAPS = 64
 
 
-def one_publisher() -> int:
-    """Return 1: what to assume where nothing is known."""
-    return 1
-
-
 class SequenceGaps:
     """Lost messages of one topic.
 
@@ -26,7 +21,7 @@ class SequenceGaps:
         # First and last number of what is missing; the latest gaps only.
         self._missing: list[tuple[int, int]] = []
 
-    def add(self, sequence: int, count_publishers: Callable[[], int] = one_publisher) -> int:
+    def add(self, sequence: int, count_publishers: Callable[[], int] = lambda: 1) -> int:
         """Note a message and return how many were lost directly before it."""
         self.received += 1
         last = self._last

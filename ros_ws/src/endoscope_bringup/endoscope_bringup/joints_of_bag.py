@@ -9,18 +9,18 @@ from endoscope_bags import JointStateSeries, Recording
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.identification import Recording as HysteresisRecording
 from endoscope_core.identification import Servo
-
-BENDING = 'slave/measured_js'
-MOTOR = 'motor/measured_js'
-MOTOR_COMMAND = 'motor/servo_jp'
-DESIRED = 'slave/servo_jp'
+from endoscope_nodes.names import (
+    MOTOR_COMMAND,
+    MOTOR_MEASURED,
+    SLAVE_COMMAND,
+    SLAVE_MEASURED,
+    WIRES_MEASURED,
+)
 
 GRID_STEP = 0.005
-_COMMAND_STEP = 0.001
+_STEP = 0.001
 
 Array = NDArray[np.float64]
-WIRES = 'wires/measured_js'
-_STEP = 0.001
 
 
 def hysteresis_of_bag(bag: Recording, gear: float) -> dict[str, HysteresisRecording]:
@@ -29,9 +29,7 @@ def hysteresis_of_bag(bag: Recording, gear: float) -> dict[str, HysteresisRecord
     The motor angle is the measured one; where it is missing, the motor's command or the desired
     angle passed through the nominal servo.
     """
-    if not gear > 0.0:
-        raise EndoscopeError(f'gear = {gear} must be positive')
-    bending = bag.joint_state(BENDING, finite=('position',))
+    bending = bag.joint_state(SLAVE_MEASURED, finite=('position',))
     motor, scale, measured = _motor(bag, gear)
     origin = int(bending.stamp_ns[0])
     found = {}
@@ -61,33 +59,31 @@ def hysteresis_of_bag(bag: Recording, gear: float) -> dict[str, HysteresisRecord
 
 def _motor(bag: Recording, gear: float) -> tuple[JointStateSeries, float, bool]:
     """Best account of the motors, what its angles are to be divided by, whether it is measured."""
-    for topic, scale, measured in (
-        (MOTOR, gear, True),
-        (MOTOR_COMMAND, gear, False),
-        (DESIRED, 1.0, False),
-    ):
+    for topic, scale in ((MOTOR_MEASURED, gear), (MOTOR_COMMAND, gear), (SLAVE_COMMAND, 1.0)):
         if bag.has(topic):
-            return bag.joint_state(topic, finite=('position',)), scale, measured
+            series = bag.joint_state(topic, finite=('position',))
+            return series, scale, topic == MOTOR_MEASURED
     raise EndoscopeError(
-        f'{bag.path}: lacks {MOTOR}, {MOTOR_COMMAND} and {DESIRED}: it does not say what the '
-        'motors did'
+        f'{bag.path}: lacks {MOTOR_MEASURED}, {MOTOR_COMMAND} and {SLAVE_COMMAND}: it does not say '
+        'what the motors did'
     )
 
 
 def _angle_over_time(series: JointStateSeries, joint: str, origin_ns: int) -> tuple[Array, Array]:
     """Seconds since `origin_ns` and angles of one joint, one for each stamp."""
-    if series.position is None:
-        raise EndoscopeError(f'topic {series.topic} holds no positions')
     seconds = series.seconds(origin_ns)
     keep = np.concatenate(([True], np.diff(seconds) > 0.0))
-    return seconds[keep], series.position[keep, series.names.index(joint)]
+    return seconds[keep], series.select([joint]).require('position')[keep, 0]
 
 
 def _servo(stamps: Array, command: Array, grid: Array) -> Array:
     """What the nominal servo makes of a command that holds until the next one."""
-    time = np.arange(stamps[0], grid[-1] + _COMMAND_STEP, _COMMAND_STEP)
-    held = command[np.clip(np.searchsorted(stamps, time, side='right') - 1, 0, None)]
-    return np.interp(grid, time, Servo().answer(held, _COMMAND_STEP))
+    time = np.arange(stamps[0], grid[-1] + _STEP, _STEP)
+    return np.interp(grid, time, Servo().answer(_held(stamps, command, time), _STEP))
+
+
+def _held(stamps: Array, command: Array, time: Array) -> Array:
+    return command[np.clip(np.searchsorted(stamps, time, side='right') - 1, 0, None)]
 
 
 @dataclass(frozen=True)
@@ -104,15 +100,14 @@ def plant_recordings_of_bag(bag: Recording, gear: float) -> dict[str, PlantRecor
 
     The recording should begin at rest at zero, as a calibration does.
     """
-    if not gear > 0.0:
-        raise EndoscopeError(f'gear = {gear} must be positive')
-    for topic in (MOTOR_COMMAND, WIRES):
+    for topic in (MOTOR_COMMAND, WIRES_MEASURED):
         if not bag.has(topic):
             raise EndoscopeError(f'{bag.path}: lacks {topic}, which shows the plant')
     motors = bag.joint_state(MOTOR_COMMAND, finite=('position',))
-    wires = bag.joint_state(WIRES, finite=('effort',))
-    if motors.position is None or wires.effort is None:
-        raise EndoscopeError(f'{bag.path}: motor commands or tensions hold no values')
+    wires = bag.joint_state(WIRES_MEASURED, finite=('effort',))
+    bent = None
+    if bag.has(SLAVE_MEASURED):
+        bent = bag.joint_state(SLAVE_MEASURED, finite=('position',))
     origin = int(motors.stamp_ns[0])
     times, tension_times = motors.seconds(origin), wires.seconds(origin)
     grid = np.arange(max(0.0, tension_times[0]), min(times[-1], tension_times[-1]), _STEP)
@@ -121,26 +116,17 @@ def plant_recordings_of_bag(bag: Recording, gear: float) -> dict[str, PlantRecor
         motor, pair = f'motor_{name}', (f'wire_{name}_pos', f'wire_{name}_neg')
         if motor not in motors.names or not set(pair) <= set(wires.names):
             continue
-        held = np.clip(np.searchsorted(times, grid, side='right') - 1, 0, None)
-        tension = [
-            np.interp(grid, tension_times, wires.effort[:, wires.names.index(wire)])
-            for wire in pair
-        ]
+        command = motors.select([motor]).require('position')[:, 0]
+        tension = wires.select(pair).require('effort')
+        bending = None
+        if bent is not None and bent.position is not None and f'bend_{name}' in bent.names:
+            angle = bent.select([f'bend_{name}']).require('position')[:, 0]
+            bending = np.interp(grid, bent.seconds(origin), angle, left=np.nan, right=np.nan)
         found[f'bend_{name}'] = PlantRecording(
-            motors.position[held, motors.names.index(motor)] / gear,
-            np.stack(tension, axis=1),
-            _bending(bag, f'bend_{name}', origin, grid),
+            _held(times, command, grid) / gear,
+            np.stack([np.interp(grid, tension_times, wire) for wire in tension.T], axis=1),
+            bending,
         )
     if not found:
         raise EndoscopeError(f'{bag.path}: no joint has a motor command and two wire tensions')
     return found
-
-
-def _bending(bag: Recording, joint: str, origin: int, grid: Array) -> Array | None:
-    if not bag.has(BENDING):
-        return None
-    angles = bag.joint_state(BENDING, finite=('position',))
-    if angles.position is None or joint not in angles.names:
-        return None
-    measured = angles.position[:, angles.names.index(joint)]
-    return np.interp(grid, angles.seconds(origin), measured, left=np.nan, right=np.nan)

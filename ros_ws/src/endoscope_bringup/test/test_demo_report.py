@@ -9,18 +9,11 @@ import pytest
 from chromium import LARGEST_PAGE, drawn
 
 from endoscope_bringup.demo import sentences
-from endoscope_bringup.demo.analysis import (
-    Angles,
-    longest_crossing,
-    reversals,
-    run_of,
-    start_of_motion,
-)
+from endoscope_bringup.demo.analysis import Angles, run_of, start_of_motion
 from endoscope_bringup.demo.page import endoscope_picture, report_page
 from endoscope_bringup.demo.procedure import MOTIONS, TUBES, CalibrationFacts, Method, Segment
 from endoscope_bringup.demo.results import (
     CalibrationOutcome,
-    Crossing,
     DemoResults,
     TrackingRun,
     figures_table,
@@ -30,7 +23,6 @@ from endoscope_bringup.demo.results import (
 from endoscope_core.signals import motion_by_name
 
 ROOT = Path(__file__).parents[4]
-NO_TURNS = (np.array([]), np.array([]))
 LAG = {Method.NONE: 0.4, Method.BOUC_WEN: 0.1, Method.INVERSE: 0.02}
 REACH = ((-61.7, 51.5), (-61.7, 51.5))
 
@@ -61,7 +53,7 @@ def run(tube, motion, method, lag):
     signal = motion_by_name(motion)
     time = np.arange(*signal.steady, 0.025)
     desired, late = (np.degrees(signal.sample(t)[0]) for t in (time, time - lag))
-    return TrackingRun(tube, motion, method, time, desired, late, NO_TURNS, Crossing(0.2, 50.0))
+    return TrackingRun(tube, motion, method, time, desired, late)
 
 
 def results_of(lag):
@@ -126,14 +118,6 @@ def test_no_method_is_praised_where_none_helps():
     assert 'is best' not in report_page(worse, {})
 
 
-def test_an_angle_that_was_cut_turns_where_it_comes_off_its_end():
-    time = np.arange(0.0, 3.0, 0.001)
-    cut = np.minimum(60.0 * np.sin(time), 50.0)
-    # What shapes a command rounds the corner: it goes a little too far.
-    cut[np.argmax(cut == 50.0) + np.arange(50)] = 50.5
-    assert reversals(time, cut) == pytest.approx([np.pi - np.arcsin(50 / 60)], abs=2e-3)
-
-
 def test_a_signal_that_a_tube_cannot_follow_is_said_to_be_cut(results):
     assert sentences.where_signals_were_cut(results, Method.INVERSE) == []
     runs = tuple(replace(r, desired_deg=np.minimum(r.desired_deg, 51.5)) for r in results.runs)
@@ -153,11 +137,9 @@ def test_a_run_is_compared_with_what_was_asked_for_in_that_run():
         asked[early] = 0.3 * (way - asked_time[early, None])
         stamps = asked_time[::25]
         angles = Angles(100.0 + stamps, asked[::25] + 0.01, 100.0 + asked_time, asked)
-        shafts = 100.0 + asked_time, 0.5 * asked
-        made = run_of(angles, shafts, Segment('t', 'periodic', Method.NONE, 100.0, 116.0))
+        made = run_of(angles, Segment('t', 'periodic', Method.NONE, 100.0, 116.0))
         assert made.desired_deg[:, 0] == pytest.approx(60.0 * np.sin(made.time), abs=0.1)
         assert made.rmse_deg == pytest.approx(np.degrees(0.01))
-        assert made.crossing == Crossing(0.0, 0.0)
 
 
 def test_the_start_of_a_motion_is_found_though_it_was_cut():
@@ -173,18 +155,7 @@ def test_a_run_that_ended_before_its_motion_did_is_refused():
     asked = signal.sample(time - 2.5)[0]
     angles = Angles(time[::25], asked[::25], time, asked)
     with pytest.raises(ValueError, match='descending colon, periodic, uncompensated'):
-        run_of(
-            angles, (time, asked), Segment('descending colon', 'periodic', Method.NONE, 0.0, 15.0)
-        )
-
-
-def test_the_dead_zone_is_where_a_motor_turns_fast():
-    time = 1e-3 * np.arange(2000)
-    shafts = np.column_stack([0.1 * time, 0.1 * time])
-    shafts[1000:, 1] += np.minimum(4.0 * (time[1000:] - 1.0), 0.8)
-    crossing = longest_crossing(time, shafts, 0.0, 2.0)
-    assert crossing.seconds == pytest.approx(0.2, abs=0.02)
-    assert crossing.width_deg == pytest.approx(np.degrees(0.8 / 0.5), rel=0.1)
+        run_of(angles, Segment('descending colon', 'periodic', Method.NONE, 0.0, 15.0))
 
 
 def test_the_documentation_shows_the_drawing_that_the_page_has():

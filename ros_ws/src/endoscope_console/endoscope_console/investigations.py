@@ -215,7 +215,6 @@ class Investigations:
             one.question.answer.set_result(go)
 
     def answer(self, question: str, go: bool) -> str:
-        """Answer what the operator is asked."""
         for one in self._all.values():
             if one.question is not None and one.question.id == question:
                 self._answer(one, go)

@@ -104,7 +104,6 @@ class Stream:
         return self.last.position
 
     def close(self) -> None:
-        """Leave the topic."""
         self._subscription.close()
 
 
@@ -175,6 +174,5 @@ class Pictures:
         return sum(stream.malformed for stream in self._streams)
 
     def close(self) -> None:
-        """Leave all topics."""
         for stream in self._streams:
             stream.close()

@@ -127,7 +127,7 @@ class Console:
                 'version': VERSION,
                 'you': client.id,
                 'role': client.role,
-                'grips': self.operations.beat.grips,
+                'grips': self.operations.controls.beat.grips,
                 'signals': SIGNALS,
                 'joints': JOINTS,
                 'limits': {
@@ -184,24 +184,24 @@ class Console:
                     self._note_end(message)
                     return
                 if client.rate.exceeded(arrived_ns):
-                    self.operations.refuse(client, Reason.FLOOD, arrived_ns)
+                    self.operations.controls.refuse(client, Reason.FLOOD, arrived_ns)
                     await socket.close(_MALFORMED, 'too many frames')
                     return
                 try:
                     if message.get('bytes') is not None:
                         frame = decode_input(message['bytes'])
-                        self.operations.hear(client, frame, arrived_ns)
+                        self.operations.controls.hear(client, frame, arrived_ns)
                     else:
                         order = read_order(message.get('text') or '')
                         start(self._obey, socket, client, order)
                 except (MalformedFrameError, MalformedOrderError) as error:
-                    self.operations.refuse(client, Reason.MALFORMED, arrived_ns)
+                    self.operations.controls.refuse(client, Reason.MALFORMED, arrived_ns)
                     await socket.close(_MALFORMED, _short(str(error)))
                     return
         finally:
             client.tell = _nobody
             self.clients.leave(client)
-            self.operations.closed(client)
+            self.operations.controls.closed(client)
 
     async def _obey(self, socket: WebSocket, client: Client, order: Any) -> None:
         halts = isinstance(order, State) and order.command in HALTS
@@ -226,18 +226,18 @@ class Console:
         due_ns, period_ns = time.monotonic_ns(), round(1e9 / self.rate)
         while True:
             now_ns = time.monotonic_ns()
-            if not self.operations.beat.alive:
+            if not self.operations.controls.beat.alive:
                 raise RuntimeError('the thread that speaks for the handle has ended')
             self.graph.hear(now_ns)
             picture = self.graph.pictures.make(now_ns, time.time_ns())
-            self.operations.turn(now_ns)
+            self.operations.controls.turn(now_ns)
             state = self.view.news(now_ns)
             watching = self.clients.of('telemetry')
             for client in watching:
                 client.outbox.put_picture(picture)
                 if state:
                     client.outbox.put_state(state)
-            watched = watching or self.operations.lease.holder
+            watched = watching or self.operations.controls.lease.holder
             due_ns = max(due_ns + (period_ns if watched else _UNWATCHED_NS), now_ns)
             await asyncio.sleep((due_ns - time.monotonic_ns()) * 1e-9)
 

@@ -25,6 +25,7 @@ from endoscope_console.alarms import Alarms
 from endoscope_console.background import Background
 from endoscope_console.beat import Beat
 from endoscope_console.clients import OF_A_KIND, UNANSWERED, Clients
+from endoscope_console.controls import Controls
 from endoscope_console.explanations import Explanations
 from endoscope_console.graph_side import GraphSide, graph_side
 from endoscope_console.investigations import Investigations
@@ -64,7 +65,6 @@ class _Server(uvicorn.Server):
     """Leaves signals to whoever serves."""
 
     def capture_signals(self) -> Any:
-        """Capture none."""
         return nullcontext()
 
 
@@ -149,9 +149,8 @@ async def _serve(
     investigations = Investigations(args.bags, explanations, background)
     limits = (rig.joints.hand_speed,) * len(JOINTS)
     with Beat(graph.client.node, PadHandle(len(JOINTS), (SPEEDS,) * len(JOINTS), limits)) as beat:
-        operations = Operations(
-            graph, beat, clients, explanations, investigations, Alarms(), counts
-        )
+        controls = Controls(graph, beat, clients, counts)
+        operations = Operations(controls, explanations, investigations, Alarms())
         view = View(operations, rig, counts, args.rate)
         console = Console(
             graph,

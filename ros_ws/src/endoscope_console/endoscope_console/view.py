@@ -77,7 +77,7 @@ class View:
                 | {
                     'pictures': self._graph.pictures.seq,
                     'pictures dropped': self._counts['pictures dropped']
-                    + self._operations.clients.dropped,
+                    + self._operations.controls.clients.dropped,
                     'malformed messages': self._graph.pictures.malformed,
                 },
             }
@@ -85,11 +85,11 @@ class View:
 
     @property
     def _graph(self) -> GraphSide:
-        return self._operations.graph
+        return self._operations.controls.graph
 
     @property
     def _client(self) -> GraphClient:
-        return self._operations.graph.client
+        return self._operations.controls.graph.client
 
     def _state_age_s(self, now_ns: int) -> float | None:
         heard_ns = self._graph.heard_ns
@@ -98,7 +98,7 @@ class View:
     def _steady(self, now_ns: int) -> dict[str, Any]:
         """All that is news when it changes."""
         operations, client = self._operations, self._client
-        said = operations.beat.said
+        said = operations.controls.beat.said
         engaged = said.state is DeadManState.ENGAGED
         alarms = operations.alarms.update({a.id: a for a in self._alarms(now_ns)})
         settings, pictures, order = self._graph.settings, self._graph.pictures, client.underway
@@ -110,17 +110,17 @@ class View:
             'causes': self._causes(),
             'graph_ended': self._graph.ended is not None,
             'lease': {
-                'holder': operations.lease.holder,
+                'holder': operations.controls.lease.holder,
                 'operators': [
                     {'name': c.id, 'label': c.label, 'role': c.role}
-                    for c in operations.clients.of('command')
+                    for c in operations.controls.clients.of('command')
                 ],
             },
             'dead_man': {
                 'state': said.state,
                 'reason': said.reason or '',
                 'missing': said.missing or '',
-                'grips': operations.beat.grips,
+                'grips': operations.controls.beat.grips,
                 'following': engaged and pictures.wanted is not None and pictures.drives,
                 'counts': said.counts,
             },
@@ -135,8 +135,8 @@ class View:
             'recorder': _recorder(client.health.get(RECORDER)),
             'console': {'source': settings.source, 'scale': settings.scale},
             'playing': self._playing(),
-            'prepares': operations.playing.prepares,
-            'investigates': operations.playing.investigates,
+            'prepares': operations.controls.playing.prepares,
+            'investigates': operations.controls.playing.investigates,
             'alarms': alarms,
             'explanations': operations.explanations.as_list(),
             'investigations': operations.investigations.as_list(),
@@ -195,7 +195,7 @@ class View:
         recorder = client.health.get(RECORDER)
         compensator = client.compensator
         watch = client.health.get(WATCH)
-        reason = operations.beat.said.reason
+        reason = operations.controls.beat.said.reason
         factor = client.factor
         found = [
             (
@@ -203,7 +203,7 @@ class View:
                 Alarm('fault', Level.HIGH, client.why or 'the slave is in FAULT', latched=True),
             ),
             (
-                operations.attendance.lacks,
+                operations.controls.attendance.lacks,
                 Alarm('unattended', Level.HIGH, _UNATTENDED, latched=True),
             ),
             (silent and enabled, Alarm('supervisor', Level.HIGH, 'the supervisor is silent')),

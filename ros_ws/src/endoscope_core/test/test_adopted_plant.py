@@ -53,8 +53,9 @@ def test_what_the_inverse_tracks_worse_with_is_left_out_and_named():
 def test_the_range_is_within_the_reach_of_the_rig(with_play):
     ends = np.array([(within.low, within.high) for within in with_play.ranges])
     assert np.all(np.abs(ends) <= RIG.joints.reach)
-    assert with_play.outside((0.0, 0.0)) is None
-    assert with_play.outside((0.0, 1.01 * ends[1, 1])) == 1
+    with_play.check_within((0.0, 0.0), JOINTS)
+    with pytest.raises(AdoptionError, match='bend_y is at'):
+        with_play.check_within((0.0, 1.01 * ends[1, 1]), JOINTS)
 
 
 WEAK = EffectSpec('torque_limit', 'bend_x', {'limit_nm': 0.001})

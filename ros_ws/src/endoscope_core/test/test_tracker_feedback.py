@@ -42,7 +42,6 @@ def test_at_rest_it_stays_when_it_is_switched_off_and_on_and_forgets(at_rest):
         change()
         _, corrections = drive.run(1.0, lambda _: angle)
         assert np.all(corrections == before)
-        assert not drive.controller.faded
 
 
 def test_a_tracker_that_was_gone_moves_the_correction_no_faster_than_stated():
@@ -84,7 +83,7 @@ def test_switched_off_or_without_tracker_it_fades_to_nothing_and_comes_back_with
         drive.controller.deactivate()
     _, fading = drive.run(1.7, math.sin, tracker)
     assert fading[-1] == 0.0
-    assert drive.controller.faded
+    assert drive.controller.weight == 0.0
     assert drive.controller.tracker_fresh(15.7) == tracker
     drive.controller.activate()
     _, returning = drive.run(3.0, math.sin)

@@ -70,7 +70,6 @@ def improved_plant(explanation: Explanation, audit: AuditReport) -> PlantDescrip
 
 
 def changed_parameters(estimates: Mapping[str, NominalEstimate]) -> dict[str, NominalEstimate]:
-    """Parameters whose intervals exclude their described values, the largest change first."""
     changed = {name: e for name, e in estimates.items() if has_changed(name, e)}
 
     def reach(item: tuple[str, NominalEstimate]) -> float:

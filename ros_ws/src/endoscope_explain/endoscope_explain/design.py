@@ -6,7 +6,7 @@ family of safe motions (Hunter, Reiner, Technometrics 7, 1965; Chen, Asprey, Ind
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
@@ -18,12 +18,11 @@ from endoscope_core.physics.packing import without_functions
 from endoscope_core.physics.simulator import TICK, simulate
 from endoscope_core.rig import Rig
 from endoscope_core.safety import MotionLimits, MotionShaper
-from endoscope_core.signals import Signal, hold, move, sequence
 from endoscope_core.signals.command_file import JOINTS
-from endoscope_core.signals.motions import chirp, multisine, steps_with_holds, triangle
 from endoscope_core.workers import parallel_map
 from endoscope_explain.case import NextExperiment
 from endoscope_explain.decide.conclusions import spec_of
+from endoscope_explain.experiment_motions import SAMPLE_S, Waveform, family
 from endoscope_explain.explanation import NamedEffect
 from endoscope_explain.fit.free_parameters import LEAD, effect_parameters, nominal_parameters
 from endoscope_explain.fit.model import Fit, JointModel, fit, jacobian, joint_of, packed_joint
@@ -33,81 +32,6 @@ from endoscope_explain.search.screen import background, directions, screened
 from endoscope_explain.search.term import Term, starting_points
 
 Array = NDArray[np.float64]
-
-SAMPLE_S = 0.01
-
-
-@dataclass(frozen=True)
-class Waveform:
-    """A motion of one joint; the others rest."""
-
-    name: str
-    joint: str
-    time: Array  # (N,), s
-    angle: Array  # (N,), desired bending angle in rad
-
-
-def family(joint: str, others: tuple[str, ...], reach: float) -> list[Waveform]:
-    """List the motions of a joint up to `reach` rad; the others are each moved alone, too."""
-    a = reach
-    signals = [
-        ('steps with holds', steps_with_holds((0.5 * a, a, 0.2 * a, -a, -0.4 * a), 0.15, 2.0)),
-        ('slow ramps', triangle(a, 0.25 * a)),
-        ('chirp', chirp(0.7 * a, 14.0, 0.2, 5.0)),
-        ('multisine', multisine(a, 14.0)),
-        ('nested reversals', nested_reversals(a)),
-        ('fast and slow', fast_and_slow(a)),
-        ('rest on either side', rest_on_either_side(a)),
-    ]
-    found = [_sampled(name, joint, signal) for name, signal in signals]
-    found += [_sampled(f'{other} alone', other, multisine(a, 14.0)) for other in others]
-    return found
-
-
-def nested_reversals(reach: float) -> Signal:
-    """Turn back earlier and earlier: inner loops within outer ones (`reach` in rad)."""
-    parts, here = [], 0.0
-    for share in (1.0, -1.0, 0.8, -0.6, 0.6, -0.3, 0.4, 0.0, 0.2, 0.0):
-        target = share * reach
-        parts.append(move(here, target, 0.4 + 1.2 * abs(target - here) / max(reach, 1e-9)))
-        here = target
-    return sequence('nested reversals', parts)
-
-
-def fast_and_slow(reach: float) -> Signal:
-    """Make the same stroke at three speeds: what depends on speed shows against what does not."""
-    parts: list[Signal] = []
-    for duration in (3.0, 1.2, 0.5):
-        parts += [
-            move(0.0, reach, 0.5 * duration),
-            move(reach, -reach, duration),
-            move(-reach, 0.0, 0.5 * duration),
-            hold(0.4),
-        ]
-    return sequence('fast and slow', parts)
-
-
-def rest_on_either_side(reach: float) -> Signal:
-    """Rest for long at rest, bent one way and bent the other: what changes by itself shows."""
-    return sequence(
-        'rest on either side',
-        [
-            hold(3.0),
-            move(0.0, reach, 1.0),
-            hold(5.0, reach),
-            move(reach, -reach, 1.5),
-            hold(5.0, -reach),
-            move(-reach, 0.0, 1.0),
-            hold(1.0),
-        ],
-    )
-
-
-def _sampled(name: str, joint: str, signal: Signal) -> Waveform:
-    time = np.arange(0.0, signal.duration + 0.5 * SAMPLE_S, SAMPLE_S)
-    angle, _ = signal(time)
-    return Waveform(name, joint, time, np.asarray(angle))
-
 
 SETTLES_S = 1.0
 """Most that a motion may end later than was asked for, because the rig is slower."""
@@ -179,13 +103,7 @@ def left_over(truth: Recording, rival: PlantDescription, joint: str) -> Array:
     return refit(rival, observation, NOMINAL_BAND, REFIT_STEPS).residuals
 
 
-def distance(truth: Recording, rival: PlantDescription, joint: str) -> float:
-    """What a rival misses of the other rival's noise-free answer after its refit, rms."""
-    return float(np.sqrt(np.mean(left_over(truth, rival, joint) ** 2)))
-
-
 def imagine(plant: PlantDescription, waveform: Waveform, rig: Rig) -> Recording:
-    """A plant's noise-free answer to the motion of one joint."""
     joints = plant.joint_names()
     desired = np.zeros((len(waveform.time), len(joints)))
     desired[:, joints.index(waveform.joint)] = waveform.angle

@@ -7,13 +7,13 @@ from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.rig import shipped_rig
 from endoscope_explain.design import (
     NUMBERS,
-    distance,
-    family,
     imagine,
     is_safe,
+    left_over,
     propose,
     propose_beside_numbers,
 )
+from endoscope_explain.experiment_motions import family
 from endoscope_explain.explanation import NamedEffect
 
 PLANT = PlantDescription()
@@ -22,6 +22,10 @@ RIVALLED = NamedEffect('transport_delay', 'bend_x', {}, ('actuator_lag',))
 
 def with_effect(effect_id, **parameters):
     return dataclasses.replace(PLANT, effects=(EffectSpec(effect_id, 'bend_x', parameters),))
+
+
+def distance(truth, rival, joint):
+    return np.sqrt(np.mean(left_over(truth, rival, joint) ** 2))
 
 
 @pytest.fixture(scope='module')

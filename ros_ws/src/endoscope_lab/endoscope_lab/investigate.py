@@ -20,7 +20,8 @@ from endoscope_core.rig import shipped_rig
 from endoscope_core.signals.command_file import CommandTable, read_command_file
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.case import ExplainedCase
-from endoscope_explain.design import SAMPLE_S, as_played, family
+from endoscope_explain.design import SAMPLE_S, as_played
+from endoscope_explain.experiment_motions import family
 from endoscope_explain.explanation import Explanation
 from endoscope_explain.investigation.investigation import EXPERIMENTS, Investigation, investigate
 from endoscope_explain.investigation.log import Stop

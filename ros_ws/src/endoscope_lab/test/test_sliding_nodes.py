@@ -6,7 +6,8 @@ import pytest
 from outside_data import CASES, needs
 from scipy.interpolate import CubicSpline
 
-from endoscope_lab.concealed.sliding_nodes import NOMINAL, follow, move_wire, simulate
+from endoscope_lab.concealed.sliding_nodes import NOMINAL, follow, simulate
+from endoscope_lab.concealed.sliding_wire import move_wire
 
 REFERENCE = CASES / 'sheath' / 'reference'
 

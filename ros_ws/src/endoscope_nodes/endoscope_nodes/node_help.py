@@ -5,7 +5,8 @@ from collections.abc import Iterator, Sequence
 
 from endoscope_nodes.runtime.node_parameters import OF_NODE, OF_PROCESS
 from endoscope_nodes.runtime.parameters import Described, described
-from endoscope_nodes.topics import SERVICES, TOPICS
+from endoscope_nodes.services import SERVICES
+from endoscope_nodes.topics import TOPICS
 
 _WIDTH = 100
 _USAGE = """\

@@ -1,4 +1,4 @@
-"""The interface: every topic and service of the graph, said once.
+"""The interface: every topic of the graph, said once.
 
 Nodes, recorder, help and reference pages take from here; nothing here needs ROS.
 
@@ -22,10 +22,8 @@ class Qos:
     latched: bool = False  # a reader that comes late is given the last message (transient local)
 
     def __str__(self) -> str:
-        words = ['reliable' if self.reliable else 'best effort']
-        if self.latched:
-            words.append('transient local')
-        return ', '.join((*words, str(self.depth)))
+        reliability = 'reliable' if self.reliable else 'best effort'
+        return ', '.join((reliability, *['transient local'] * self.latched, str(self.depth)))
 
 
 SENSOR_OFFERED = Qos(100)
@@ -54,22 +52,11 @@ class Topic:
     one_sender: bool = False  # whoever else speaks here while the slave is enabled is a fault
 
 
-@dataclass(frozen=True)
-class Service:
-    """A service of the graph; all are `std_srvs/srv/Trigger`: success, and a message in words."""
-
-    name: str  # relative to the namespace of the graph
-    served_by: str  # node
-    purpose: str  # what it does and when it is refused
-    device: str = ''  # without which it is not there; empty for none
-
-
-TRIGGER = 'std_srvs/srv/Trigger'
-
 _JOINT_STATE = 'sensor_msgs/msg/JointState'
 _DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
 _STREAM = '1 kHz'
 _LATCHED_STATE = 'on change, latched'
+_MOVERS = ('master', 'compensator', 'controller')
 
 # Offered and asked.
 _SENSOR = SENSOR_OFFERED, SENSOR_ASKED
@@ -115,14 +102,7 @@ TOPICS = (
         'bending by the EM tracker: `position` in rad of `bend_x` and `bend_y`',
         *_SENSOR,
         said_by=('em_tracker',),
-        heard_by=(
-            'master',
-            'compensator',
-            'controller',
-            'calibration',
-            'instrument_model',
-            'watch',
-        ),
+        heard_by=(*_MOVERS, 'calibration', 'instrument_model', 'watch'),
         one_sender=True,
     ),
     Topic(
@@ -155,10 +135,7 @@ TOPICS = (
         '`motor_y`',
         *_SENSOR,
         said_by=('motor_driver',),
-        heard_by=(
-            *('master', 'compensator', 'controller', 'calibration', 'supervisor', 'watch'),
-            'load_cells',
-        ),
+        heard_by=(*_MOVERS, 'calibration', 'supervisor', 'watch', 'load_cells'),
         one_sender=True,
     ),
     Topic(
@@ -187,7 +164,7 @@ TOPICS = (
         'the master and passes uncompensated',
         *_COMMANDS,
         said_by=('calibration',),
-        heard_by=('master', 'compensator', 'controller'),
+        heard_by=_MOVERS,
         recorded=False,
         one_sender=True,
     ),
@@ -210,7 +187,7 @@ TOPICS = (
         'nothing is compensated',
         *_RESULTS,
         said_by=('calibration',),
-        heard_by=('master', 'compensator', 'controller'),
+        heard_by=_MOVERS,
         one_sender=True,
     ),
     Topic(
@@ -301,7 +278,7 @@ TOPICS = (
         '`frame_id` names the motion session that the last `enable` opened; empty for none',
         *_EVENTS,
         said_by=('supervisor',),
-        heard_by=('master', 'compensator', 'controller', 'calibration', 'motor_driver'),
+        heard_by=(*_MOVERS, 'calibration', 'motor_driver'),
         one_sender=True,
     ),
     Topic(
@@ -417,51 +394,6 @@ TOPICS = (
         recorded=False,
     ),
 )
-"""Every topic of the graph."""
-
-SERVICES = (
-    Service(
-        names.CALIBRATION_RUN,
-        'calibration',
-        f'begins a calibration, which needs an enabled slave; {names.CALIBRATION_RESULT} says how '
-        'it went',
-    ),
-    Service(
-        names.RECORDER_START,
-        'recorder',
-        'begins a recording, and says where; refused while one is being made',
-    ),
-    Service(
-        names.RECORDER_STOP,
-        'recorder',
-        'ends the recording, and says how many messages it has and how many were lost',
-    ),
-    Service(
-        names.WATCH_RESTART,
-        'watch',
-        'forgets its alarms and what it has learnt of the rig, and learns anew; refused while it '
-        'is off',
-    ),
-    Service(
-        names.LOAD_CELLS_TARE,
-        'load_cells',
-        'takes the tension of the last second for zero; refused while shafts turn, noise or drift '
-        'is too large or the wires are loaded, and by simulated cells',
-    ),
-    Service(
-        names.REGISTER_STRAIGHT,
-        'em_tracker',
-        'takes the mean pose of the last second for that of the straight instrument; refused while '
-        'it moves, and by the simulated tracker',
-    ),
-    Service(
-        names.MOTOR_REBOOT,
-        'motor_driver',
-        'restarts servos that have shut down, without torque; refused while the slave is enabled',
-        device='dynamixel',
-    ),
-)
-"""Every service of the graph, beside those that ROS gives every node."""
 
 BY_NAME = {topic.name: topic for topic in TOPICS}
 RECORDED = tuple(topic.name for topic in TOPICS if topic.recorded)

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from endoscope_bags import Recording, open_bag
 from endoscope_bringup.demo.procedure import CalibrationFacts, Segment
-from endoscope_bringup.demo.results import CalibrationOutcome, Crossing, DemoResults, TrackingRun
-from endoscope_core.rig import shipped_rig
+from endoscope_bringup.demo.results import CalibrationOutcome, DemoResults, TrackingRun
 from endoscope_core.signals import (
     CALIBRATION_RECORD_DURATION,
     Signal,
@@ -26,12 +25,6 @@ REST_S = 0.5
 
 LATEST_START_S = 3.0
 
-TURNED_DEG, STILL_DEG = 1.0, 1e-4
-"""A way back that counts; a step that is none."""
-
-HALF_SPAN = 5
-"""Samples of the shafts, either way, over which their speed is taken."""
-
 
 def analyse(
     bags: dict[str, Path],
@@ -42,7 +35,6 @@ def analyse(
     """Figures of all runs, from the recordings alone; `lost` is what recorders missed, by topic."""
     recordings = {tube: open_bag(path) for tube, path in bags.items()}
     angles = {tube: Angles.of(recording) for tube, recording in recordings.items()}
-    shafts = {tube: _shafts(recording) for tube, recording in recordings.items()}
     messages: dict[str, int] = {}
     for recording in recordings.values():
         for name, topic in recording.topics.items():
@@ -52,7 +44,7 @@ def analyse(
             _calibration(recordings[facts.tube], angles[facts.tube], facts)
             for facts in calibrations
         ),
-        tuple(run_of(angles[s.tube], shafts[s.tube], s) for s in segments),
+        tuple(run_of(angles[s.tube], s) for s in segments),
         _noise(angles, segments),
         dict(sorted(messages.items())),
         lost,
@@ -70,7 +62,6 @@ class Angles:
 
     @classmethod
     def of(cls, recording: Recording) -> 'Angles':
-        """Those of a recording."""
         actual = recording.joint_state(names.SLAVE_MEASURED).select(names.JOINTS)
         asked = recording.joint_state(names.SLAVE_COMMAND).select(names.JOINTS)
         return cls(
@@ -98,8 +89,8 @@ class Angles:
         return np.column_stack(columns)
 
 
-def run_of(angles: Angles, shafts: tuple[Array, Array], segment: Segment) -> TrackingRun:
-    """The steady part of a run, beside what was asked for; `shafts` are (K,) s and (K, J) rad."""
+def run_of(angles: Angles, segment: Segment) -> TrackingRun:
+    """The steady part of a run, beside what was asked for."""
     own = angles.between(segment.start, segment.end)
     signal = motion_by_name(segment.motion).joints[names.JOINTS[0]]
     began = start_of_motion(own.asked_time, own.asked[:, 0], signal)
@@ -117,10 +108,6 @@ def run_of(angles: Angles, shafts: tuple[Array, Array], segment: Segment) -> Tra
         time=time[inside],
         desired_deg=np.degrees(own.desired[inside]),
         actual_deg=np.degrees(own.actual[inside]),
-        reversals=tuple(
-            reversals(own.asked_time - began, np.degrees(asked)) for asked in own.asked.T
-        ),
-        crossing=longest_crossing(*shafts, segment.start + began + signal.steady[0], segment.end),
     )
 
 
@@ -137,45 +124,6 @@ def start_of_motion(time: Array, desired: Array, signal: Signal) -> float:
 
     coarse = min(np.arange(0.0, LATEST_START_S, 0.02), key=misfit)
     return float(min(np.arange(coarse - 0.02, coarse + 0.02, 0.001), key=misfit))
-
-
-def reversals(time: Array, desired_deg: Array) -> Array:
-    """Instants (R,) in s at which a way back begins that leads back by `TURNED_DEG` at least."""
-    turns = []
-    moves = np.diff(desired_deg)
-    way, furthest = 0.0, float(desired_deg[0])
-    for k, angle in enumerate(desired_deg.tolist()):
-        if way * (angle - furthest) >= 0.0:
-            way, furthest = way or float(np.sign(angle - furthest)), angle
-        elif abs(angle - furthest) > TURNED_DEG:
-            way, furthest = -way, angle
-            # An angle that was cut turns where it comes off its end.
-            turns.append(time[np.flatnonzero(way * moves[:k] <= STILL_DEG)[-1] + 1])
-    return np.array(turns)
-
-
-def longest_crossing(time: Array, shafts: Array, start: float, end: float) -> Crossing:
-    """Longest stretch of `shafts` (K, J), rad, at more than half the motors' top speed."""
-    rig = shipped_rig()
-    inside = (time >= start) & (time < end)
-    time, shafts = time[inside], shafts[inside]
-    span = 2 * HALF_SPAN
-    # An encoder counts: its speed is told over more than a tick.
-    speed = np.abs(shafts[span:] - shafts[:-span]) / (time[span:] - time[:-span])[:, None]
-    longest = Crossing(0.0, 0.0)
-    for fast, shaft in zip((speed > 0.5 * rig.motors.speed).T, shafts.T, strict=True):
-        edges = np.flatnonzero(np.diff(np.concatenate(([0], fast, [0]))))
-        for first, last in zip(edges[::2] + HALF_SPAN, edges[1::2] + HALF_SPAN - 1, strict=True):
-            seconds = float(time[last] - time[first])
-            if seconds > longest.seconds:
-                turned = abs(shaft[last] - shaft[first]) / rig.joints.gear
-                longest = Crossing(seconds, float(np.degrees(turned)))
-    return longest
-
-
-def _shafts(recording: Recording) -> tuple[Array, Array]:
-    series = recording.joint_state(names.MOTOR_MEASURED).select(names.MOTORS)
-    return series.seconds(0), series.require('position')
 
 
 def _noise(angles: dict[str, Angles], segments: Sequence[Segment]) -> float:

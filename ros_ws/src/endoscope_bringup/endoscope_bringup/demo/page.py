@@ -167,7 +167,7 @@ def report_page(results: DemoResults, facts: dict[str, str]) -> str:
         wrong=sentences.what_is_wrong(rows),
         helps=[(m, sentences.what_helps(rows, m)) for m in order if m is not Method.NONE],
         paper=sentences.beside_the_paper(rows, Method.BOUC_WEN),
-        left=sentences.what_is_left(results, best),
+        noise=sentences.beside_the_noise(results, best),
         cut=sentences.where_signals_were_cut(results, best),
         order=order,
         best=best,

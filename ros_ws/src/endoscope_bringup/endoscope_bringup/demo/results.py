@@ -45,17 +45,6 @@ class CalibrationOutcome:
 
 
 @dataclass(frozen=True)
-class Crossing:
-    """The longest stretch of a run in which a motor turned at more than half its top speed.
-
-    No signal of the demonstration asks for that: it is the dead zone of a reversal.
-    """
-
-    seconds: float  # 0 where there was none
-    width_deg: float  # bending for which the shaft would have turned as far without friction
-
-
-@dataclass(frozen=True)
 class TrackingRun:
     """One motion tracked by one method, over its steady part, at the tracker's stamps."""
 
@@ -65,8 +54,6 @@ class TrackingRun:
     time: Array  # (N,), s since the motion began
     desired_deg: Array  # (N, J), asked for in this very run
     actual_deg: Array  # (N, J), as the tracker saw it
-    reversals: tuple[Array, ...]  # of each joint, when what was asked for turned back
-    crossing: Crossing
 
     @property
     def error_deg(self) -> Array:
@@ -81,7 +68,6 @@ class TrackingRun:
 
     @property
     def largest_deg(self) -> float:
-        """Largest error of any joint."""
         return float(np.abs(self.error_deg).max())
 
     @property
@@ -151,7 +137,6 @@ def table_rows(results: DemoResults) -> list[TableRow]:
 
 
 def of_figure(rows: Sequence[TableRow], figure: str) -> list[TableRow]:
-    """The rows of one figure."""
     return [row for row in rows if row.figure == figure]
 
 

@@ -22,10 +22,6 @@ from endoscope_nodes.names import JOINTS
 
 Array = NDArray[np.float64]
 
-AFTER_REVERSAL_S = 0.5
-NOISES = 4.0
-"""Standard deviations of the tracker beyond which an error is taken for more than its noise."""
-
 LEAST_CUT_DEG = 0.1
 
 
@@ -40,7 +36,6 @@ def headline(rows: Sequence[TableRow]) -> str:
 
 
 def what_is_wrong(rows: Sequence[TableRow]) -> str:
-    """How far an uncompensated tip is from where it shall be."""
     rmse = [row.values[Method.NONE] for row in of_figure(rows, RMSE)]
     largest = max(row.values[Method.NONE] for row in of_figure(rows, LARGEST))
     return (
@@ -50,7 +45,6 @@ def what_is_wrong(rows: Sequence[TableRow]) -> str:
 
 
 def what_helps(rows: Sequence[TableRow], method: Method) -> str:
-    """What a method leaves."""
     rmse = [row.values[method] for row in of_figure(rows, RMSE)]
     largest = max(row.values[method] for row in of_figure(rows, LARGEST))
     return (
@@ -72,57 +66,10 @@ def beside_the_paper(rows: Sequence[TableRow], method: Method) -> str:
     )
 
 
-def share_after_reversals(runs: Sequence[TrackingRun]) -> tuple[float, float]:
-    """Share of the squared error, and of the time, within `AFTER_REVERSAL_S` of a reversal."""
-    squares, after = [], []
-    for run in runs:
-        for turns, error in zip(run.reversals, run.error_deg.T, strict=True):
-            since = run.time[:, None] - turns
-            after.append(np.any((since >= 0.0) & (since < AFTER_REVERSAL_S), axis=1))
-            squares.append(error**2)
-    square, near = np.concatenate(squares), np.concatenate(after)
-    return float(square[near].sum() / square.sum()), float(near.mean())
-
-
-def longest_excursion(runs: Sequence[TrackingRun], limit_deg: float) -> float:
-    """Longest time in s that an error stays beyond a limit."""
-    longest = 0.0
-    for run in runs:
-        for error in np.abs(run.error_deg).T:
-            beyond = np.flatnonzero(np.diff(np.concatenate(([0], error > limit_deg, [0]))))
-            for start, end in zip(beyond[::2], beyond[1::2], strict=True):
-                longest = max(longest, float(run.time[end - 1] - run.time[start]))
-    return longest
-
-
-def what_is_left(results: DemoResults, method: Method) -> list[str]:
-    """Where the error is that a method leaves, for how long, and why; the first is a heading."""
-    runs = [run for run in results.runs if run.method is method]
-    limit = NOISES * results.noise_deg
-    worst = max(runs, key=lambda run: run.largest_deg)
-    left = _degrees([run.rmse_deg for run in runs])
-    noise = f"The tracker's noise alone is {results.noise_deg:.2f}° RMSE; {method} leaves {left}."
-    if worst.largest_deg <= limit:
-        return ["What is left: the tracker's noise", noise]
-    square, time = share_after_reversals(runs)
-    heading = (
-        f'What is left: up to {_degree(worst.largest_deg)}, beyond {limit:.1f}° never longer than '
-        f'{longest_excursion(runs, limit):.1f} s'
-    )
-    where = (
-        f'{100 * square:.0f} % of the squared error falls within {AFTER_REVERSAL_S:g} s after a '
-        f'reversal, {100 * time:.0f} % of the time. The largest error is in the {worst.tube} under '
-        f'{MOTION_TITLE[worst.motion]}.'
-    )
-    sentences = [heading, noise, where]
-    crossing = max((run.crossing for run in runs), key=lambda c: c.seconds)
-    if crossing.seconds > 0.0:
-        sentences.append(
-            'At a reversal the friction along the whole sheath has to turn round before the tip '
-            f'follows: a dead zone of up to {_degree(crossing.width_deg)}, which the motor crosses '
-            f'at full speed in up to {crossing.seconds:.1f} s.'
-        )
-    return sentences
+def beside_the_noise(results: DemoResults, method: Method) -> str:
+    """What a method leaves beside the noise of the tracker."""
+    left = _degrees([run.rmse_deg for run in results.runs if run.method is method])
+    return f"The tracker's noise alone is {results.noise_deg:.2f}° RMSE; {method} leaves {left}."
 
 
 def where_signals_were_cut(results: DemoResults, best: Method) -> list[str]:
@@ -152,7 +99,6 @@ def where_signals_were_cut(results: DemoResults, best: Method) -> list[str]:
 
 
 def of_loops(results: DemoResults, tube: str, motion: str, best: Method) -> str:
-    """What a tube's loops show."""
     said = f'{tube.capitalize()}, {MOTION_TITLE[motion]}. A perfect tip stays on the dotted line.'
     if best is Method.NONE:
         return said
@@ -161,7 +107,6 @@ def of_loops(results: DemoResults, tube: str, motion: str, best: Method) -> str:
 
 
 def of_tracking(results: DemoResults, tube: str, motion: str, methods: Sequence[Method]) -> str:
-    """What the runs of one motion show."""
     runs = [results.run(tube, motion, method) for method in methods]
     figures = '; '.join(
         f'{run.method} RMSE {run.rmse_deg:.2f}°, largest {run.largest_deg:.1f}°' for run in runs
@@ -173,7 +118,6 @@ def of_tracking(results: DemoResults, tube: str, motion: str, methods: Sequence[
 
 
 def of_calibration(facts: CalibrationFacts) -> str:
-    """What a calibration shows."""
     return (
         f'{facts.tube.capitalize()}, calibration: the tensions of the four wires put the tube in '
         f'class {facts.class_deg:.0f}° with probability '

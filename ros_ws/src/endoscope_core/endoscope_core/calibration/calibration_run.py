@@ -5,12 +5,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_core.calibration.records import TensionRecord
 from endoscope_core.signals import CalibrationMotion, both_joints, calibration_motion, move
-
-Array = NDArray[np.float64]
 
 # A minimum-jerk move peaks at 1.875 times its mean speed.
 _PEAK_OF_MEAN = 1.875

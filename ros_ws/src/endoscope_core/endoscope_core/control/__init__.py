@@ -1,15 +1,14 @@
 """From a hand to a command: what is desired, feed-forward and feedback."""
 
 from endoscope_core.choices import ADAPTIVE_PHYSICAL, MODES
-from endoscope_core.control.adaptive_backlash import (
-    AdaptiveBacklashSettings,
-)
+from endoscope_core.control.adaptive_backlash import AdaptiveBacklashSettings
 from endoscope_core.control.adopted_plant import (
     AdoptedPlant,
     AdoptionError,
     adopted_plant,
     plant_hash,
 )
+from endoscope_core.control.corrections import Corrections
 from endoscope_core.control.desired_motion import DesiredMotion
 from endoscope_core.control.feedforward import Feedforward, FeedforwardLaw, FeedforwardSettings
 from endoscope_core.control.handle import Handle, HandleRefusal, HandleSettings
@@ -26,6 +25,7 @@ __all__ = [
     'AdaptiveBacklashSettings',
     'AdoptedPlant',
     'AdoptionError',
+    'Corrections',
     'DesiredMotion',
     'Feedforward',
     'FeedforwardLaw',

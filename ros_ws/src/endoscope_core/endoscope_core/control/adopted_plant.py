@@ -32,7 +32,7 @@ from endoscope_core.physics.packing import without_functions
 from endoscope_core.physics.plant_file import plant_from_mapping
 from endoscope_core.physics.simulator import TICK, simulate
 from endoscope_core.rig import Rig, digest
-from endoscope_core.safety import AdoptionCode, BendingRange
+from endoscope_core.safety import AdoptionCode, BendingRange, ranges_in_words
 from endoscope_core.schema import parse_yaml
 from endoscope_core.signals import periodic_signal
 
@@ -74,12 +74,15 @@ class AdoptedPlant:
         """The feed-forward that inverts it."""
         return FeedforwardLaw(PHYSICAL, self.parameters)
 
-    def outside(self, angles: tuple[float, ...]) -> int | None:
-        """The first joint that is bent (J,), in rad, further than the ranges; None if none is."""
-        for j, (angle, within) in enumerate(zip(angles, self.ranges, strict=True)):
+    def check_within(self, angles: tuple[float, ...], joints: tuple[str, ...]) -> None:
+        """Raise an AdoptionError where one of the joints is bent (J,), in rad, beyond its range."""
+        for joint, angle, within in zip(joints, angles, self.ranges, strict=True):
             if within.keep(angle, 0.0)[0] != angle:
-                return j
-        return None
+                raise AdoptionError(
+                    AdoptionCode.BEYOND_RANGE,
+                    f'{joint} is at {math.degrees(angle):.0f} deg; '
+                    f'{ranges_in_words((within,), (joint,))}',
+                )
 
 
 def plant_hash(text: str) -> str:

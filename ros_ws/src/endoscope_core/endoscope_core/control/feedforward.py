@@ -55,19 +55,15 @@ class Passing:
     def __init__(self, travel: float) -> None:
         self._travel = travel
         self._desired = 0.0
-        self._direction = 0.0
-
-    @property
-    def direction(self) -> float:
-        return self._direction
+        self.direction = 0.0
 
     def begin(self, direction: float, desired: float, velocity: float) -> float:
-        self._direction, self._desired = direction, desired
+        self.direction, self._desired = direction, desired
         return desired
 
     def wanted(self, desired: float, velocity: float, dt: float) -> float:
         moved = desired - self._desired
-        self._direction = float(dahl_step(self._direction, moved, self._travel, 1.0))
+        self.direction = float(dahl_step(self.direction, moved, self._travel, 1.0))
         self._desired = desired
         return desired
 
@@ -204,6 +200,7 @@ class Feedforward:
         self._count = joints
         self._joints: list[_Joint] = []
         self._start: list[float] | None = None
+        self._compiled: set[str] = set()
 
     @property
     def command(self) -> NDArray[np.float64] | None:
@@ -240,6 +237,16 @@ class Feedforward:
             joint.inverse = self._inverse(j, desired)
             joint.wanted = joint.inverse.begin(before, joint.desired, joint.velocity)
             joint.offset = joint.command - joint.wanted
+
+    def compile(self, law: FeedforwardLaw) -> None:
+        """Compile the mode of a law before a command waits for it, once."""
+        if law.mode in self._compiled:
+            return
+        trial, zero = Feedforward(self._count, self.settings), [0.0] * self._count
+        trial.select(law)
+        trial.step(zero, zero, 1e-3)
+        trial.measure(0.0, zero)
+        self._compiled.add(law.mode)
 
     def rebase(self, command: Vector, desired: Vector | None = None) -> None:
         """Go on from this command (J,) in rad, sent by someone else meanwhile, without a jump.

@@ -60,7 +60,6 @@ _MOST_TURNS = 12
 _RAMPS, _RAMP_S = (0.1, 0.2), 5.0
 """Speeds of a shaft in rad/s, and how long it turns, which tell the lag of a servo with effects."""
 _ALONE = 'joint'
-_SECTION_KEYS = frozenset(('section_friction', 'section_straight_angle'))
 _BEYOND = 10.0
 """Rad to which no joint bends."""
 
@@ -96,13 +95,8 @@ class PhysicalParameters:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> PhysicalParameters:
-        """Parameters from a mapping of their names; without section friction there is none.
-
-        ValueError if another name is missing, one is unknown, or a value is out of range.
-        """
-        # What was written before the plant could have section friction is read as it was meant.
-        names = {item.name for item in fields(JointParameters)}
-        if odd := (names - _SECTION_KEYS) ^ (set(values) - _SECTION_KEYS):
+        """Parameters from a mapping of exactly their names; a ValueError names what is wrong."""
+        if odd := {item.name for item in fields(JointParameters)} ^ set(values):
             raise ValueError(
                 f'parameters of the plant are wrong or missing: {", ".join(sorted(odd))}'
             )
@@ -123,7 +117,6 @@ class TurningPoints:
         self.values = list(values)
 
     def follow(self, value: float) -> None:
-        """Go on to a value."""
         v = self.values
         if len(v) > 1 and (v[-1] - v[-2]) * (value - v[-1]) >= 0.0:
             v[-1] = value
@@ -318,7 +311,6 @@ class InternalModel:
 
     @property
     def angle(self) -> float:
-        """Tip's angle, rad."""
         return float(self._state[TIP])
 
     @property
@@ -332,7 +324,6 @@ class InternalModel:
 
     @property
     def shaft(self) -> float:
-        """Shaft angle, rad."""
         return float(self._state[MOTOR])
 
     @property

@@ -10,7 +10,7 @@ from endoscope_core.control.internal_model import (
     TurningPoints,
 )
 from endoscope_core.control.limits import COUNT, MotorLimits
-from endoscope_core.control.plant_learning import PlantLearning, PlantLearningSettings
+from endoscope_core.control.plant_learning import PlantLearning
 
 SWING = 1.0
 """Rad from which a joint is taken to have come whose motion is known by its direction alone."""
@@ -36,20 +36,11 @@ class PhysicalInverse:
         self.other = 0.0  # where the other joint is to be, rad: the two may be coupled
         self.model = InternalModel(parameters.joint, self.limits, parameters.added)
         self._turns = TurningPoints([0.0])
-        self._way = 0.0
-        self._arrived = True
+        self.direction = 0.0  # in which the joint was bent last, -1 or 1; 0 before
+        # The model's joint is where it shall be: no dead zone to cross, no limit met.
+        self.arrived = True
         # Turning points of the shaft until parameters were last taken over, rad.
         self.shafts: tuple[float, ...] = (0.0,)
-
-    @property
-    def direction(self) -> float:
-        """Which way the joint has been bent last: -1, 1, or 0 before it ever was."""
-        return self._way
-
-    @property
-    def arrived(self) -> bool:
-        """Whether the model's joint is where it shall be: no dead zone to cross, no limit met."""
-        return self._arrived
 
     @property
     def command(self) -> float:
@@ -63,8 +54,8 @@ class PhysicalInverse:
         [-1, 1], and from rest at zero otherwise.
         """
         target = desired + self.servo_lag * velocity
-        self._way = 0.0 if abs(direction) < 0.5 else math.copysign(1.0, direction)
-        before = [target - self._way * SWING] if self._way else []
+        self.direction = 0.0 if abs(direction) < 0.5 else math.copysign(1.0, direction)
+        before = [target - self.direction * SWING] if self.direction else []
         self._turns = TurningPoints([0.0, *before, target])
         self.take(self.parameters)
         return self.command
@@ -77,11 +68,11 @@ class PhysicalInverse:
         # At a reversal the joint stands still until the front of the turning motor has come through
         # the sheath; that dead zone is crossed as fast as the motor can. So that noise at rest does
         # not cross it to and fro, the model turns back only once `dead_band` is passed.
-        if missing * self._way <= 0.0 and abs(missing) <= self._dead_band:
+        if missing * self.direction <= 0.0 and abs(missing) <= self._dead_band:
             self.model.turn(self.model.shaft, dt)
         else:
-            self._way = math.copysign(1.0, missing)
-            self._arrived = self.model.seek(target, dt)
+            self.direction = math.copysign(1.0, missing)
+            self.arrived = self.model.seek(target, dt)
             self._turns.follow(self.model.angle)
         return self.command
 
@@ -94,7 +85,7 @@ class PhysicalInverse:
         self.model = InternalModel(parameters.joint, self.limits, parameters.added)
         self.model.other = self.other
         self.shafts = (0.0, *self.model.go_through(self._turns.values[1:]))
-        self._arrived = True
+        self.arrived = True
 
 
 class AdaptivePhysicalInverse(PhysicalInverse):
@@ -110,19 +101,15 @@ class AdaptivePhysicalInverse(PhysicalInverse):
         parameters: PhysicalParameters,
         limits: MotorLimits,
         dead_band: float = 2.0 * COUNT,
-        learning: PlantLearningSettings | None = None,
     ) -> None:
         super().__init__(parameters, limits, dead_band)
-        self._learning_settings = learning
-        self._learning = PlantLearning(parameters, self.limits.gear, settings=learning)
+        self._learning = PlantLearning(parameters, self.limits.gear)
 
     def begin(self, direction: float, desired: float, velocity: float) -> float:
         """Start again with what was learnt; return the command wanted now (rad)."""
         self.parameters = self._learning.parameters
         wanted = super().begin(direction, desired, velocity)
-        self._learning = PlantLearning(
-            self.parameters, self.limits.gear, self.shafts, self._learning_settings
-        )
+        self._learning = PlantLearning(self.parameters, self.limits.gear, self.shafts)
         return wanted
 
     def sent(self, command: float, dt: float) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,23 +43,16 @@ _BENT_ANEW = 0.7
 _LARGEST_STEP = 0.05
 """Of a logarithm by one measurement: the sensitivities hold nearby."""
 _STRAIGHTEST, _MOST_BENT = 0.02, 4.5
-
-
-@dataclass(frozen=True)
-class PlantLearningSettings:
-    """How fast the tube is believed to change, how far the tracker is believed; rad and s."""
-
-    tracker_noise: float = 0.01  # rad, with what the model cannot explain
-    # s by which model and tracker may be apart: a measurement counts little while the tip darts.
-    timing: float = 0.02
-    # Standard deviation of the change of ``log(capstan_exponent)`` in one second.
-    drift: float = 0.03
-    surprise: float = 3.5  # innovation, in its standard deviations, that counts as surprising
-    # Surprising measurements in a row after which the tube is taken to have changed.
-    surprises: int = 3
-    reset_pause: float = 12.0  # s from one such moment to the next: tubes are not bent all the time
-    # s over which misfit is averaged; what stays unexplained makes the tracker count for less.
-    doubt_time: float = 2.0
+_TRACKER_NOISE = 0.01  # rad, with what the model cannot explain
+# s by which model and tracker may be apart: a measurement counts little while the tip darts.
+_TIMING = 0.02
+# Standard deviation of the change of ``log(capstan_exponent)`` in one second.
+_DRIFT = 0.03
+# So many innovations in a row beyond so many standard deviations say that the tube has changed; s
+# from one such moment to the next: tubes are not bent all the time.
+_SURPRISES, _SURPRISE, _RESET_PAUSE = 3, 3.5, 12.0
+# s over which misfit is averaged; what stays unexplained makes the tracker count for less.
+_DOUBT_TIME = 2.0
 
 
 class PlantLearning:
@@ -79,9 +72,7 @@ class PlantLearning:
         parameters: PhysicalParameters,
         gear: float,
         shafts: Sequence[float] = (0.0,),
-        settings: PlantLearningSettings | None = None,
     ) -> None:
-        self.settings = settings or PlantLearningSettings()
         self.parameters = parameters  # as estimated
         self._first = parameters
         self._names = tuple(LEARNT)
@@ -144,8 +135,8 @@ class PlantLearning:
         self._last = time
         tips, speed = found
         sensitivity = (tips[1:] - tips[0]) / self._STEP
-        self.covariance[0, 0] += self.settings.drift**2 * elapsed
-        noise = self.settings.tracker_noise**2 + (self.settings.timing * speed) ** 2
+        self.covariance[0, 0] += _DRIFT**2 * elapsed
+        noise = _TRACKER_NOISE**2 + (_TIMING * speed) ** 2
         noise *= self._unexplained
         innovation = angle - tips[0]
         self._watch(innovation, sensitivity, noise, elapsed)
@@ -164,13 +155,12 @@ class PlantLearning:
 
     def _watch(self, innovation: float, sensitivity: Array, noise: float, elapsed: float) -> None:
         spread = noise + float(sensitivity @ self.covariance @ sensitivity)
-        c = self.settings
         # Misfit that stays is physics that the model lacks, not a parameter: believe less.
         grown = self._unexplained * innovation**2 / spread
-        weight = min(1.0, elapsed / c.doubt_time)
+        weight = min(1.0, elapsed / _DOUBT_TIME)
         self._unexplained = max(1.0, self._unexplained + weight * (grown - self._unexplained))
-        self._surprises = self._surprises + 1 if innovation**2 > c.surprise**2 * spread else 0
-        if self._surprises >= c.surprises and self._time - self._last_reset > c.reset_pause:
+        self._surprises = self._surprises + 1 if innovation**2 > _SURPRISE**2 * spread else 0
+        if self._surprises >= _SURPRISES and self._time - self._last_reset > _RESET_PAUSE:
             self._surprises = 0
             self._last_reset = self._time
             self._unexplained = 1.0

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.control.adaptive_backlash import (
-    AdaptationState,
     AdaptiveBacklashJoint,
     AdaptiveBacklashSettings,
 )
@@ -99,16 +98,6 @@ class AdaptiveBacklashController:
     def weight(self) -> float:
         """Share of the correction that is applied, 0 to 1; the largest of the joints."""
         return max(output.weight for output in self._outputs)
-
-    @property
-    def faded(self) -> bool:
-        """Whether nothing is left of the correction."""
-        return all(output.weight == output.offset == 0.0 for output in self._outputs)
-
-    @property
-    def estimates(self) -> tuple[AdaptationState, ...]:
-        """What has been learnt, for each joint."""
-        return tuple(law.state for law in self._laws)
 
     @property
     def learnt(self) -> tuple[tuple[float, float], ...]:

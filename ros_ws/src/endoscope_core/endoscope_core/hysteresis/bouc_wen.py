@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 
 from endoscope_core.compiled import njit
 from endoscope_core.hysteresis.memory_model import (
-    GREATEST_ALPHA,
-    GREATEST_INVERSE_SLOPE,
-    GREATEST_LAG,
-    SMALLEST_ALPHA,
     NamedNumbers,
+    check_inverse,
     check_numbers,
+    check_range,
 )
 
 _LONGEST_SUBSTEP = 0.1
@@ -129,33 +127,13 @@ class BoucWenParameters(NamedNumbers):
 
     def __post_init__(self) -> None:
         check_numbers(self.MODEL, asdict(self))
-        checks = [
-            (
-                SMALLEST_ALPHA <= self.alpha <= GREATEST_ALPHA,
-                f'alpha = {self.alpha:g} must lie in [{SMALLEST_ALPHA:g}, {GREATEST_ALPHA:g}]',
-            ),
-            (self.beta <= 0.0, f'beta = {self.beta:g} must not be positive'),
-            (self.A > 0.0, f'A = {self.A:g} must be positive'),
-            (self.B > 0.0, f'B = {self.B:g} must be positive'),
-            (self.B + self.C > 0.0, f'B + C = {self.B + self.C:g} must be positive'),
-            (
-                1.0 <= self.n <= GREATEST_EXPONENT,
-                f'n = {self.n:g} must lie in [1, {GREATEST_EXPONENT:g}]',
-            ),
-        ]
-        for holds, message in checks:
-            if not holds:
-                raise ValueError(f'Bouc-Wen parameter {message}')
-        if self.lag > GREATEST_LAG * (1.0 + 1e-9):
-            raise ValueError(
-                f'Bouc-Wen lag |beta| h_max = {math.degrees(self.lag):.1f} deg exceeds '
-                f'{math.degrees(GREATEST_LAG):.0f} deg'
-            )
-        if self.inverse_slope > GREATEST_INVERSE_SLOPE * (1.0 + 1e-9):
-            raise ValueError(
-                f'Bouc-Wen inverse is too steep: {self.inverse_slope:.1f} '
-                f'exceeds {GREATEST_INVERSE_SLOPE:g}'
-            )
+        check_range(self.MODEL, 'n', self.n, 1.0, GREATEST_EXPONENT)
+        if self.beta > 0.0:
+            raise ValueError(f'Bouc-Wen parameter beta = {self.beta:g} must not be positive')
+        for name, value in (('A', self.A), ('B', self.B), ('B + C', self.B + self.C)):
+            if not value > 0.0:
+                raise ValueError(f'Bouc-Wen parameter {name} = {value:g} must be positive')
+        check_inverse(self.MODEL, self)
 
     @cached_property
     def h_max(self) -> float:

@@ -92,7 +92,7 @@ class DahlParameters(NamedNumbers):
         check_range(self.MODEL, 'exponent', self.exponent, LEAST_EXPONENT, GREATEST_EXPONENT)
         check_range(self.MODEL, 'offset', self.offset, -GREATEST_OFFSET, GREATEST_OFFSET)
         check_range(self.MODEL, 'travel', self.travel, 1e-4, 100.0)
-        check_inverse(self.MODEL, self.alpha, self.lag, self.inverse_slope)
+        check_inverse(self.MODEL, self)
 
     @property
     def inverse_slope(self) -> float:

@@ -21,20 +21,15 @@ class DirectInverse:
 
     def __init__(self, model: MemoryModel, direction: float, angle: float) -> None:
         self._model = model
-        self._memory = min(1.0, max(-1.0, direction))
+        self.direction = min(1.0, max(-1.0, direction))  # that the motion has taken, in [-1, 1]
         self._angle = angle
-
-    @property
-    def direction(self) -> float:
-        """Which way the desired motion has taken, in [-1, 1]."""
-        return self._memory
 
     def command(self) -> float:
         """``(theta_d - offset + lag y) / alpha`` in rad, equation 5 of the first paper."""
         model = self._model
-        return (self._angle - model.offset + model.lag * self._memory) / model.alpha
+        return (self._angle - model.offset + model.lag * self.direction) / model.alpha
 
     def move_to(self, angle: float) -> None:
         """Follow the desired angle to `angle` rad, monotonically."""
-        self._memory = self._model.memory_step(self._memory, angle - self._angle)
+        self.direction = self._model.memory_step(self.direction, angle - self._angle)
         self._angle = angle

@@ -29,24 +29,6 @@ def check_range(model: str, name: str, value: float, low: float, high: float) ->
         raise ValueError(f'{model} parameter {name} = {value:g} must lie in [{low:g}, {high:g}]')
 
 
-def check_inverse(model: str, alpha: float, lag: float, slope: float) -> None:
-    """Refuse a model whose inverse would not be safe: a ValueError names what is out of bounds.
-
-    The inverse divides by `alpha`, the ratio of actual to driving angle. `lag` in rad is half the
-    width of a saturated loop along the actual angle, `slope` the greatest of the inverse.
-    """
-    check_range(model, 'alpha', alpha, SMALLEST_ALPHA, GREATEST_ALPHA)
-    if not -1e-12 <= lag <= GREATEST_LAG * _ROUNDING:
-        raise ValueError(
-            f'{model} lag is {math.degrees(lag):.1f} deg: it must lie in '
-            f'[0, {math.degrees(GREATEST_LAG):.0f}] deg'
-        )
-    if slope > GREATEST_INVERSE_SLOPE * _ROUNDING:
-        raise ValueError(
-            f'{model} inverse is too steep: {slope:.1f} exceeds {GREATEST_INVERSE_SLOPE:g}'
-        )
-
-
 @dataclass(frozen=True)
 class NamedNumbers:
     """Base of parameter sets whose fields are all numbers."""
@@ -55,7 +37,6 @@ class NamedNumbers:
     """The model's name in messages."""
 
     def to_dict(self) -> dict[str, float]:
-        """The parameters by name."""
         return asdict(self)
 
     @classmethod
@@ -114,6 +95,21 @@ class MemoryModel(Protocol):
         ...
 
 
+def check_inverse(name: str, model: MemoryModel) -> None:
+    """Refuse a model whose inverse would not be safe: a ValueError says what is out of bounds."""
+    check_range(name, 'alpha', model.alpha, SMALLEST_ALPHA, GREATEST_ALPHA)
+    if not -1e-12 <= model.lag <= GREATEST_LAG * _ROUNDING:
+        raise ValueError(
+            f'{name} lag is {math.degrees(model.lag):.1f} deg: it must lie in '
+            f'[0, {math.degrees(GREATEST_LAG):.0f}] deg'
+        )
+    if model.inverse_slope > GREATEST_INVERSE_SLOPE * _ROUNDING:
+        raise ValueError(
+            f'{name} inverse is too steep: {model.inverse_slope:.1f} exceeds '
+            f'{GREATEST_INVERSE_SLOPE:g}'
+        )
+
+
 def forward(model: MemoryModel, theta: ArrayLike, y0: float = 0.0) -> NDArray[np.float64]:
     """Actual angle (N,) for a driving angle (N,), both in rad; the memory begins at `y0`."""
     driver = _series(theta)
@@ -122,10 +118,10 @@ def forward(model: MemoryModel, theta: ArrayLike, y0: float = 0.0) -> NDArray[np
     return result
 
 
-def direct_inverse(model: MemoryModel, theta_d: ArrayLike, y0: float = 0.0) -> NDArray[np.float64]:
-    """Command (N,) for a desired angle (N,), both in rad; the memory begins at `y0`."""
+def direct_inverse(model: MemoryModel, theta_d: ArrayLike) -> NDArray[np.float64]:
+    """Command (N,) for a desired angle (N,), both in rad; the memory begins at 0."""
     driver = _series(theta_d)
-    memory = model.memory_path(driver, y0)
+    memory = model.memory_path(driver, 0.0)
     result: NDArray[np.float64] = (driver - model.offset + model.lag * memory) / model.alpha
     return result
 

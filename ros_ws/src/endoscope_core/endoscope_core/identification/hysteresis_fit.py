@@ -106,7 +106,6 @@ class ModelFit:
 
     parameters: HysteresisParameters
     rmse: float  # rad, of modelled less measured angle, an offset of each recording removed
-    evaluations: int  # simulations that the search took
     model: str = 'bouc_wen'  # name of the model
     # rad, measured less modelled angle, mean of the recordings; part of the parameters where the
     # model has an offset.
@@ -175,7 +174,7 @@ def fit_model(recordings: Sequence[Recording], seed: int = 0, model: str = 'bouc
     centred = [r.centred(residual) for r, residual in zip(recordings, residuals, strict=True)]
     spread = np.mean(np.concatenate(centred) ** 2)
     parameters = family.build(found.x[:size], factors, offset if family.has_offset else 0.0)
-    return ModelFit(parameters, float(np.sqrt(spread)), int(found.nfev), model, offset)
+    return ModelFit(parameters, float(np.sqrt(spread)), model, offset)
 
 
 def _linear_part(recordings: Sequence[Recording], memories: Sequence[Array]) -> tuple[Array, float]:

@@ -35,6 +35,12 @@ class CalibrationFindings:
     # How far each joint can be bent in this tube; empty where that is not known.
     ranges: tuple[BendingRange, ...] = ()
 
+    def __str__(self) -> str:
+        parts = [] if self.class_deg is None else [f'class {self.class_deg} deg']
+        if self.size is not None:
+            parts.append(f'size {math.degrees(self.size):.1f} deg')
+        return ', '.join([*parts, *(['plant identified'] if self.plants else [])])
+
 
 class LawChoice:
     """Finds the parameters of a mode, and keeps the files that it has read.

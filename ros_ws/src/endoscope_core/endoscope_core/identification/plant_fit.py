@@ -74,7 +74,6 @@ class PlantFit:
     parameters: PhysicalParameters
     tension_rmse: float  # N, of both wires
     bending_rmse: float | None  # rad; None where no angle was given
-    evaluations: int  # simulations that it took
 
 
 def fit_plant(
@@ -113,12 +112,10 @@ def fit_plant(
     ends = [(search, search.fitted()) for search in searches]
     search, found = min(ends, key=lambda pair: pair[0].tension_rmse(pair[1].x))
     wires_off, angle_off = search.misfits(found.x)
-    columns = 1 + len(found.x)
     return PlantFit(
         search.physical(found.x),
         _rms(wires_off),
         _rms(angle_off) if angle_off.size else None,
-        len(rigs) * len(_STARTS) + columns * sum(end.nfev for _, end in ends),
     )
 
 

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from endoscope_core.monitoring.criteria import THRESHOLDS
 from endoscope_core.monitoring.jump_test import Block, Jumps, JumpTest
 from endoscope_core.monitoring.prediction import (
-    READINGS,
     SERVO_TICK_S,
     TICK_S,
     PredictionBank,
@@ -41,7 +40,6 @@ LONGEST_GAP_S = 0.1
 """Of motors and setpoints; longer, and the wires may be anywhere."""
 LATE_S = 0.3
 """How long a block's last samples may be on their way."""
-CHANNELS = ('shaft', *READINGS)
 _NOISE = np.array([0.003, 0.05, 0.05, 0.001, 0.01])
 _PART_OF = np.array([str(change.part) for change in CHANGES])
 
@@ -120,7 +118,6 @@ class _Joint:
         return way >= STILL_RAD and visited >= LEAST_RANGE_RAD and self._way > SWEEPS * visited
 
     def add(self, begin: float, block: Block) -> None:
-        """Judge a block."""
         if self.alarm is not None and self.alarm.parts:
             return
         self.moved += 1

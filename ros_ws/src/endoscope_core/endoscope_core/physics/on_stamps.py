@@ -41,14 +41,14 @@ class Answer:
     bending: Array  # (N_tracker, J)
 
 
-def hold_on_ticks(times: Array, values: Array, ticks: int, tick: float = TICK) -> Array:
+def hold_on_ticks(times: Array, values: Array, ticks: int) -> Array:
     """Commands (N, J) that each hold until the next, as the mean (M, J) over each tick from 0 s on.
 
     Stamps (N,) in s must not decrease. Before the first one, the first command is in force.
     """
     if np.any(np.diff(times) < 0):
         raise ValueError('the stamps of the commands decrease')
-    edges = tick * np.arange(ticks + 1)
+    edges = TICK * np.arange(ticks + 1)
     index = np.clip(np.searchsorted(times, edges, side='right') - 1, 0, None)
     result = values[index[:-1]]
     # Only ticks with a change inside need the integral; elsewhere the held value is exact.
@@ -63,7 +63,7 @@ def hold_on_ticks(times: Array, values: Array, ticks: int, tick: float = TICK) -
     within = np.isin(tick_of_piece, divided)
     held = values[np.clip(np.searchsorted(times, corners[:-1], side='right') - 1, 0, None)]
     result[divided] = 0.0
-    np.add.at(result, tick_of_piece[within], (pieces[:, None] * held)[within] / tick)
+    np.add.at(result, tick_of_piece[within], (pieces[:, None] * held)[within] / TICK)
     return result
 
 
@@ -72,7 +72,6 @@ def answer_commands(
     command_stamps: Stamps,
     shaft_commands: Array,
     answer_stamps: AnswerStamps,
-    start_shaft: Array | None = None,
     read_delay: float = 0.0,
 ) -> Answer:
     """What the noise-free sensors of a rig read at given stamps under recorded commands.
@@ -80,9 +79,8 @@ def answer_commands(
     The stamps are what the devices' clocks say: a plant whose tracker's clock is skewed answers
     with the angle of the time at which that clock said so. Commands (N, J) are shaft angles in rad,
     each in force from its stamp in ns, which must not decrease, until the next one. The rig rests
-    at `start_shaft` (J,) in rad at first, or at the first command. `read_delay`: s from a stamp to
-    the reading that carries it: zero, or the length of a cycle where a rig stamps the cycle's
-    beginning, sends the command and then reads.
+    at the first command. `read_delay`: s from a stamp to the reading that carries it: zero, or the
+    length of a cycle where a rig stamps the cycle's beginning, sends the command and then reads.
     """
     origin = min(answer_stamps.first(), int(command_stamps[0]))
     faults = recording_faults(plant)
@@ -96,8 +94,7 @@ def answer_commands(
     ticks = int(np.ceil(last / TICK)) + 2
     times = _seconds(command_stamps, origin)
     command = hold_on_ticks(times, shaft_commands, ticks)
-    start = shaft_commands[0] if start_shaft is None else start_shaft
-    trajectory = simulate(plant, command, start_shaft=start)
+    trajectory = simulate(plant, command, start_shaft=shaft_commands[0])
     answer = _at_stamps(trajectory, answer_times)
     return replace(answer, bending=faults.spoilt(answer.bending, answer_times['tracker']))
 

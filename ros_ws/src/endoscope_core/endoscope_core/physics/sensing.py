@@ -107,27 +107,14 @@ class RecordingFaults:
     """The faults of a rig's clocks and recorder.
 
     Devices are shared by the joints: a skew or a gap given for one joint befalls all.
-
-    Attributes
-    ----------
-    skew : float
-        Relative rate of the tracker's clock, minus one.
-    gaps : tuple of Gap
-    outliers : tuple of Outliers
     """
 
-    skew: float = 0.0
+    skew: float = 0.0  # relative rate of the tracker's clock, minus one
     gaps: tuple[Gap, ...] = ()
     outliers: tuple[Outliers, ...] = ()
 
     def joined(self, other: 'RecordingFaults') -> 'RecordingFaults':
-        """Both of them together.
-
-        Raises
-        ------
-        ValueError
-            If they disagree about the tracker's one clock.
-        """
+        """Both of them together; a ValueError if they disagree about the tracker's one clock."""
         skews = {self.skew, other.skew} - {0.0}
         if len(skews) > 1:
             raise ValueError(
@@ -144,24 +131,7 @@ class RecordingFaults:
         return np.asarray(stamp, dtype=np.float64) / (1.0 + self.skew)
 
     def keeps(self, topic: str, time: ArrayLike) -> NDArray[np.bool_]:
-        """Whether samples of a topic are recorded.
-
-        Parameters
-        ----------
-        topic : str
-            One of `TOPICS`.
-        time : array of any shape
-            In s since the start.
-
-        Returns
-        -------
-        array of bool, shape of `time`
-
-        Raises
-        ------
-        ValueError
-            If there is no such topic.
-        """
+        """Whether samples of a topic, one of `TOPICS`, are recorded at times in s."""
         if topic not in TOPICS:
             raise ValueError(f'there is no topic {topic}: valid are {", ".join(TOPICS)}')
         time = np.asarray(time, dtype=np.float64)
@@ -172,20 +142,9 @@ class RecordingFaults:
         return kept
 
     def spoilt(self, bending: ArrayLike, time: ArrayLike, seed: int = 0) -> Array:
-        """The tracker's angles with the outliers in them.
+        """The tracker's angles (N, J) or (J,) in rad at times in s since the start, with outliers.
 
-        Parameters
-        ----------
-        bending : array (N, J) or (J,)
-            In rad.
-        time : array (N,) or float
-            In s since the start; samples less than 1 us apart count as one.
-        seed : int
-            Another seed spoils other samples.
-
-        Returns
-        -------
-        array, shape of `bending`
+        Samples less than 1 us apart count as one; another seed spoils other samples.
         """
         angles = np.array(bending, dtype=np.float64)
         microseconds = np.round(np.asarray(time, dtype=np.float64) * 1e6).astype(np.int64)

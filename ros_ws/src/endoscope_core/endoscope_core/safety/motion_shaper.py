@@ -70,19 +70,10 @@ class MotionShaper:
         self.limits = limits
         self.bounded = 0  # calls of `shape` whose target was not reached within the limits
         self._ranges = tuple(zip(limits.low, limits.high, strict=True))
-        self._position: tuple[float, ...] = ()
-        self._velocity: tuple[float, ...] = (0.0,) * len(self._ranges)
+        self.position: tuple[float, ...] = ()  # rad, (J,); empty before the first restart
+        # rad/s over the last period, (J,).
+        self.velocity: tuple[float, ...] = (0.0,) * len(self._ranges)
         self._target: tuple[float, ...] | None = None
-
-    @property
-    def position(self) -> tuple[float, ...]:
-        """Where the motion is in rad, shape (J,); empty before the first restart."""
-        return self._position
-
-    @property
-    def velocity(self) -> tuple[float, ...]:
-        """Its velocity in rad/s over the last period, shape (J,)."""
-        return self._velocity
 
     def restart(self, position: Sequence[float]) -> None:
         """Begin at rest where the joints are, in rad, shape (J,).
@@ -91,8 +82,8 @@ class MotionShaper:
 
         ValueError if the position has another size or is not finite; nothing changes then.
         """
-        self._position = self._checked('position', position)
-        self._velocity = (0.0,) * len(self._position)
+        self.position = self._checked('position', position)
+        self.velocity = (0.0,) * len(self.position)
         self._target = None
 
     def shape(self, target: Sequence[float], period: float) -> tuple[float, ...]:
@@ -103,29 +94,29 @@ class MotionShaper:
         """
         goals = self._checked('target', target)
         dt = self._begin_period(period)
-        befores = self._position if self._target is None else self._target
+        befores = self.position if self._target is None else self._target
         moves = [
             self._approach(*joint, dt)
             for joint in zip(
-                goals, befores, self._position, self._velocity, self._ranges, strict=True
+                goals, befores, self.position, self.velocity, self._ranges, strict=True
             )
         ]
-        self._position, self._velocity = zip(*moves, strict=True)
+        self.position, self.velocity = zip(*moves, strict=True)
         self._target = goals
-        if self._position != goals:
+        if self.position != goals:
             tolerance = 1e-6 * self.limits.step
-            away = (abs(g - p) for g, p in zip(goals, self._position, strict=True))
+            away = (abs(g - p) for g, p in zip(goals, self.position, strict=True))
             self.bounded += max(away) > tolerance
-        return self._position
+        return self.position
 
     def _begin_period(self, period: float) -> float:
-        if not self._position:
+        if not self.position:
             raise RuntimeError('the motion has no start: call restart first')
         if not (math.isfinite(period) and period > 0.0):
             raise ValueError(f'period = {period} s must be positive and finite')
         longest = self.limits.longest_period
         if period > longest:
-            self._velocity = (0.0,) * len(self._velocity)
+            self.velocity = (0.0,) * len(self.velocity)
             self._target = None
             return longest
         return period

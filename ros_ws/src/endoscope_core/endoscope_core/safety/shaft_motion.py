@@ -26,13 +26,8 @@ class ShaftMotion:
         self._entered = ''
         self._measured: tuple[float, ...] = ()
         self._held: tuple[float, ...] = ()
-        self._goal: tuple[float, ...] = ()
+        self.goal: tuple[float, ...] = ()  # rad, (J,); empty before the first reading
         self._stamp_ns = 0
-
-    @property
-    def goal(self) -> tuple[float, ...]:
-        """Goal of the shafts in rad, shape (J,); empty before the first reading."""
-        return self._goal
 
     @property
     def holding(self) -> bool:
@@ -42,7 +37,7 @@ class ShaftMotion:
     def measure(self, position: Sequence[float]) -> None:
         """Take a reading of the shafts in rad, shape (J,)."""
         self._measured = tuple(position)
-        if not self._goal:
+        if not self.goal:
             self._begin()
 
     def command(
@@ -85,22 +80,22 @@ class ShaftMotion:
             period = _FIRST_PERIOD_S
         self._held = ()
         if period > 0.0:
-            self._goal = self.shaper.shape(position, period)
+            self.goal = self.shaper.shape(position, period)
         return None
 
     def turn(self, now_ns: int, period: float) -> tuple[float, ...]:
         """Goal (J,) in rad, `period` s after the last; empty before the first reading."""
         self.session.beat(now_ns)
         self._notice_session()
-        if not self._goal:
+        if not self.goal:
             return ()
         if not self._held and not self.gate.is_fresh(now_ns):
             # The goal has stood since the last command, which nothing may go on from at its speed.
-            self.shaper.restart(self._goal)
+            self.shaper.restart(self.goal)
             self.hold()
         if self._held:
-            self._goal = self.shaper.shape(self._held, period)
-        return self._goal
+            self.goal = self.shaper.shape(self._held, period)
+        return self.goal
 
     def leave(self, reason: str) -> None:
         """End the driver's part in the session, and hold."""
@@ -118,7 +113,7 @@ class ShaftMotion:
             return
         self._entered = self.session.name
         self.gate.reset()
-        if not self._goal:
+        if not self.goal:
             return
         if self._entered:
             self._begin()
@@ -128,4 +123,4 @@ class ShaftMotion:
     def _begin(self) -> None:
         """Start from rest where the shafts are."""
         self.shaper.restart(self._measured)
-        self._goal = self._held = self._measured
+        self.goal = self._held = self._measured

@@ -57,7 +57,6 @@ class MissingTerm:
 
     @property
     def is_known(self) -> bool:
-        """Whether it is an effect of the catalogue."""
         return self.name in KNOWN
 
 

@@ -18,7 +18,6 @@ from endoscope_explain.fit.model import (
     JointModel,
     fit,
     without_effect,
-    without_function,
 )
 from endoscope_explain.search.levels import JointSearch, Level, search
 from endoscope_explain.search.refit import SETTLED, Candidate, candidate
@@ -59,7 +58,6 @@ GivenJoints = Mapping[str, GivenPhysics]
 def without_recording(
     terms: tuple[Term, ...], found: Fit, rivalries: Mapping[str, Rivalry] | None = None
 ) -> GivenPhysics:
-    """The physics of a fit."""
     model = found.model
     return GivenPhysics(
         terms,
@@ -106,10 +104,7 @@ def explained_by(
 
 def _needed(whole: Candidate, given: GivenPhysics, jobs: int) -> tuple[MissingTerm, ...]:
     """Each given term with what the joint loses without it, and its rivals where it has any."""
-    lesser = [
-        (without_function if term.is_function else without_effect)(whole.fit, term.id)
-        for term in whole.terms
-    ]
+    lesser = [without_effect(whole.fit, term.id) for term in whole.terms]
     fits = parallel_map(lambda less: fit(*less), lesser, jobs)
     found = []
     for term, less in zip(whole.terms, fits, strict=True):

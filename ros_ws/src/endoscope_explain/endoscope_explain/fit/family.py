@@ -55,7 +55,6 @@ class Family:
 
     @property
     def largest(self) -> float:
-        """Largest absolute value."""
         return self.place.largest_of(self.multiplies)
 
     @property
@@ -73,7 +72,6 @@ class Family:
         return self.within(self.basis @ coefficients)
 
     def within(self, values: Array) -> Array:
-        """Values (NODES,) cut to what the place allows."""
         if self.place.never_negative and not self.multiplies:
             values = np.maximum(values, 0.0)
         return np.clip(values, -self.largest, self.largest)
@@ -98,7 +96,6 @@ class Family:
         return np.asarray(drawn - span @ (span.T @ drawn))
 
     def scaled(self, amplitude: float) -> 'Family':
-        """The same functions, larger by a factor."""
         return replace(self, basis=amplitude * self.basis)
 
 

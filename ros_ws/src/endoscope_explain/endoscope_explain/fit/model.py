@@ -9,12 +9,9 @@ from numpy.typing import NDArray
 from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_core.physics.effect import NominalPhysics, Symptom
 from endoscope_core.physics.effects import CATALOGUE, describe, showing
+from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.places import HIGH, LAG, NODES, VALUES
-from endoscope_core.physics.layout import (
-    FRICTION_PROFILE,
-    NOMINAL_KEYS,
-    PROFILE_TERMS,
-)
+from endoscope_core.physics.layout import FRICTION_PROFILE, NOMINAL_KEYS, PROFILE_TERMS
 from endoscope_core.physics.packing import pack
 from endoscope_core.physics.simulator import TICK
 from endoscope_explain.fit.family import Family
@@ -153,13 +150,7 @@ class JointModel:
         ]
         return np.concatenate([theta, others])
 
-    def holding(self, places: range, theta: Array) -> tuple['JointModel', Array]:
-        """The model with the packed `places` held as in `base`, and the coordinates left free."""
-        kept = [k for k, item in enumerate(self.free) if item.index not in places]
-        return replace(self, free=tuple(self.free[k] for k in kept)), theta[kept]
-
     def residuals(self, theta: Array) -> Array:
-        """Residuals in noise units, all channels in a row."""
         return self.residuals_of(*self.packed(theta))
 
     def residuals_of(self, parameters: Array, lead: float) -> Array:
@@ -183,7 +174,6 @@ class JointModel:
         return self.wide_step if rugged else STEP
 
     def bounds(self) -> tuple[Array, Array]:
-        """Lowest and highest coordinates."""
         return (
             np.array([item.coordinate(item.low) for item in self.free]),
             np.array([item.coordinate(item.high) for item in self.free]),
@@ -199,7 +189,6 @@ class JointModel:
         )
 
     def prior_weight(self) -> Array:
-        """Inverse spreads."""
         return np.array([1.0 / item.spread for item in self.free])
 
     def cost(self, residuals: Array, theta: Array) -> float:
@@ -239,28 +228,21 @@ class Fit:
 
 
 def without_effect(found: Fit, effect_id: str) -> tuple[JointModel, Array]:
-    """Model and first coordinates (n,) of a fit that has lost one of its effects."""
-    definition = describe(effect_id)
-    base, flags = found.model.base.copy(), found.model.flags.copy()
-    flags[definition.flag] = False
-    if isinstance(definition, NominalPhysics):
-        base[definition.first_parameter] = definition.parameters[0].off
-    return replace(found.model, base=base, flags=flags).holding(definition.places, found.theta)
-
-
-def without_function(found: Fit, place_id: str) -> tuple[JointModel, Array]:
-    """Model and first coordinates (n,) of a fit that has lost its function at a place."""
+    """Model and first coordinates (n,) of a fit that has lost an effect, or a place's function."""
     model = found.model
-    which = [family.place.id for family in model.families].index(place_id)
-    place = model.families[which].place
-    flags = model.flags.copy()
-    flags[place.flag] = 0
-    gone = {*model.places_of_coefficients()[which].tolist()}
-    gone |= {k for k, item in enumerate(model.free) if item.index in place.places}
+    lost = FUNCTIONS.get(effect_id) or describe(effect_id)
+    base, flags = model.base.copy(), model.flags.copy()
+    flags[lost.flag] = False
+    if isinstance(lost, NominalPhysics):
+        base[lost.first_parameter] = lost.parameters[0].off
+    gone = {k for k, item in enumerate(model.free) if item.index in lost.places}
+    for family, places in zip(model.families, model.places_of_coefficients(), strict=True):
+        gone |= {*places.tolist()} if family.place is lost else set()
     kept = [k for k in range(len(model.free)) if k not in gone]
-    families = (*model.families[:which], *model.families[which + 1 :])
+    families = tuple(family for family in model.families if family.place is not lost)
     free = tuple(model.free[k] for k in kept)
-    return replace(model, flags=flags, free=free, families=families), found.theta[kept]
+    lesser = replace(model, base=base, flags=flags, free=free, families=families)
+    return lesser, found.theta[kept]
 
 
 def jacobian(model: JointModel, theta: Array, columns: list[int] | None = None) -> Array:

@@ -45,7 +45,6 @@ class Stroke:
 
     start: float  # rad
     end: float  # rad
-    seen_before: float  # share of it
     revisited: float  # share that was passed before, or is passed again
 
     @property
@@ -105,7 +104,6 @@ def strokes(command: Array, tick: float = TICK) -> list[Stroke]:
         Stroke(
             float(angle[a]),
             float(angle[b]),
-            float(np.mean(before[a : b + 1])),
             float(np.mean((before | again)[a : b + 1])),
         )
         for a, b in pairwise(_turns(angle, least))

@@ -5,7 +5,8 @@ import pytest
 
 from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_explain.fit.model import packed_joint, residuals, simulate_joint
-from endoscope_explain.observe.observation import fast_scatter, observe, step_read, with_held_noise
+from endoscope_explain.observe.noise import fast_scatter, step_read
+from endoscope_explain.observe.observation import observe, with_held_noise
 from endoscope_explain.observe.predicted_signals import reading_lead, simulate_rig
 
 

@@ -60,10 +60,9 @@ def test_of_a_motion_that_is_never_made_again_blocks_are_judged(one_joint):
     assert judged.mean() == pytest.approx(0.25, abs=0.05)
 
 
-def test_strokes_say_which_of_them_were_made_before(one_joint):
+def test_strokes_say_which_of_them_were_made_twice(one_joint):
     seen = observation(one_joint, np.sin(TIME[:12566]))
     made = strokes(seen.inputs[0, :, IN_COMMAND], seen.tick)
     assert [round(each.end, 1) for each in made] == [0.5, -0.5, 0.5, -0.5, 0.0]
-    assert [each.seen_before > 0.5 for each in made] == [False, False, False, True, True]
     # The first one begins where no other does; both falls are the same.
     assert [made[k].twice for k in (0, 1, 3)] == [False, True, True]

@@ -177,14 +177,12 @@ class MotionPlayer:
         client.wait_until(lambda: RECORDER in client.health, PATIENCE_S)
         said = client.health.get(RECORDER)
         before = read_parameter(client, f'{RECORDER_NODE}.bag', PATIENCE_S).value
-        if said is not None and names.BAG in said.values:
-            left = is_left_behind(Path(said.values[names.BAG]), bag.parent)
-            if left:
-                # The next recording would have the name of this one.
-                before = ''
-            if left:
-                # Whether it is whole is nothing that this motion depends on.
-                client.call(Trigger, names.RECORDER_STOP, Trigger.Request(), PATIENCE_S)
+        written = None if said is None else said.values.get(names.BAG)
+        if written is not None and is_left_behind(Path(written), bag.parent):
+            # The next recording would have the name of this one.
+            before = ''
+            # Whether it is whole is nothing that this motion depends on.
+            client.call(Trigger, names.RECORDER_STOP, Trigger.Request(), PATIENCE_S)
         after.callback(set_parameters, client, RECORDER_NODE, {'bag': before})
         set_parameters(client, RECORDER_NODE, {'bag': str(bag.absolute())})
         client.trigger(names.RECORDER_START, PATIENCE_S)

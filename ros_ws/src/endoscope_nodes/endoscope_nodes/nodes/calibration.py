@@ -2,7 +2,7 @@
 
 import contextlib
 import dataclasses
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from typing import Any
 
 import numpy as np
@@ -19,23 +19,14 @@ from endoscope_core.calibration import (
     zero_errors,
 )
 from endoscope_core.classifier.classification import (
-    PLANT_DEVIATION,
-    ClassificationResult,
     Classifier,
     ClassifierError,
     UnseenTensionError,
-    is_of_a_class,
-    of_size,
 )
 from endoscope_core.classifier.weights_file import load_classifier
-from endoscope_core.control import MotorLimits, PhysicalParameters
-from endoscope_core.identification.plant_fit import (
-    PlantFitError,
-    fits_of_calibration,
-    lost_pretension,
-    plants_of_calibration,
-    size_of_explained,
-)
+from endoscope_core.control import MotorLimits
+from endoscope_core.identification.plant_fit import PlantFitError
+from endoscope_core.judgement import Judgement, judged
 from endoscope_core.safety import StateCommand, TensionGuard
 from endoscope_core.safety.guards import TOLD_RAD
 from endoscope_core.signals import SINUSOID, calibration_motion
@@ -55,6 +46,7 @@ from endoscope_nodes.client.order_feedback import (
     OrderFeedback,
     OrderState,
 )
+from endoscope_nodes.runtime.beside import Beside
 from endoscope_nodes.runtime.diagnostics import OK, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
@@ -67,7 +59,6 @@ from endoscope_nodes.safety.sessions import SessionWatch
 from endoscope_nodes.safety.streams import StreamWatch
 
 _FED_NS = 100_000_000
-_Judgement = tuple[ClassificationResult, tuple[PhysicalParameters, ...], list[float] | None]
 
 
 class CalibrationNode(EndoscopeNode):
@@ -88,12 +79,12 @@ class CalibrationNode(EndoscopeNode):
         self._motion = calibration_motion(p.motion)
         self._beyond_reach = self._reach_exceeded()
         self._classifier = self._load_classifier(p.weights)
-        self._thread = ThreadPoolExecutor(1)
+        self._beside = Beside(self.ticker)
         self._run: CalibrationRun | None = None
         self._homing = False
         self._began_ns = 0
         self._bending = BendingRecord(len(names.JOINTS))
-        self._judging: Future[_Judgement] | None = None
+        self._judging: Future[Judgement] | None = None
         self._zeros = np.zeros(len(names.WIRES))
         self._runs = 0
         self._aborts = 0
@@ -279,34 +270,14 @@ class CalibrationNode(EndoscopeNode):
             self._abort(str(error), OrderCode.TENSION_GAP)
             return
         self._zeros = zero_errors(tension)
-        if self.ticker.paced or not self.ticker.simulated:
-            self._judging = self._thread.submit(self._judgement, self._classifier, tension)
-            return
-        self._judging = Future()
-        try:
-            self._judging.set_result(self._judgement(self._classifier, tension))
-        except (ClassifierError, PlantFitError) as error:
-            self._judging.set_exception(error)
-
-    def _judgement(self, classifier: Classifier, tension: np.ndarray) -> _Judgement:
-        """What the tensions (N, 4) say, by the plant where the classifier knows none such."""
-        time = np.arange(len(tension)) * TICK_NS * 1e-9
-        command, _ = self._motion.signal(time)
-        gear = self.rig.joints.gear
-        try:
-            verdict = classifier.classify(tension)
-        except UnseenTensionError:
-            if not self._settings.identify_plant:
-                raise
-            fits = fits_of_calibration(command, tension, gear)
-            size = size_of_explained(fits, gear)
-            if size is None or not is_of_a_class(size, classifier.classes_deg):
-                raise
-            verdict = of_size(size, PLANT_DEVIATION, classifier.classes_deg)
-            return verdict, tuple(fit.parameters for fit in fits), lost_pretension(fits)
-        if not self._settings.identify_plant:
-            return verdict, (), None
-        return verdict, plants_of_calibration(command, tension, gear), None
+        self._judging = self._beside.submit(
+            judged,
+            self._classifier,
+            self._motion,
+            tension,
+            self.rig.joints.gear,
+            self._settings.identify_plant,
+        )
 
     def _finish(self, run: CalibrationRun) -> None:
         if self._homing:
@@ -325,7 +296,7 @@ class CalibrationNode(EndoscopeNode):
         if isinstance(trouble, ClassifierError | PlantFitError):
             self._abort(str(trouble), OrderCode.NOT_JUDGED)
             return
-        verdict, plants, lost = self._judging.result()
+        found = self._judging.result()
         backlash = None
         # Backlash size is that under the sinusoid: faster motion has a wider loop.
         if run.record is not None and self._motion.name == SINUSOID:
@@ -335,20 +306,20 @@ class CalibrationNode(EndoscopeNode):
         self._publish(
             successful_result(
                 now,
-                verdict,
+                found.verdict,
                 backlash,
                 duration,
                 MotorLimits.of(self.rig),
-                plants,
+                found.plants,
                 self._zeros,
-                lost,
+                found.lost,
             )
         )
         self._run = None
         self._runs += 1
-        named = f'class {verdict.class_deg} deg{lost_in_words(lost)}'
+        named = f'class {found.verdict.class_deg} deg{lost_in_words(found.lost)}'
         self._tell(with_zeros(named, self._zeros))
-        self.get_logger().info(f'{self._last}, probability {verdict.probability:.3f}')
+        self.get_logger().info(f'{self._last}, probability {found.verdict.probability:.3f}')
 
     def _finish_homing(self) -> None:
         """Say that the slave is home where its shafts are, and only there."""
@@ -415,5 +386,4 @@ class CalibrationNode(EndoscopeNode):
         return OK, str(self._run.step), values
 
     def close(self) -> None:
-        """Let the classifier's thread end."""
-        self._thread.shutdown()
+        self._beside.close()

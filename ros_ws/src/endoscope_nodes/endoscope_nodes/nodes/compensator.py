@@ -10,6 +10,7 @@ from endoscope_core.choices import ADAPTIVE_PHYSICAL, BY_ADOPTED, BY_CLASS
 from endoscope_core.control import (
     AdoptedPlant,
     AdoptionError,
+    Corrections,
     DesiredMotion,
     Feedforward,
     FeedforwardLaw,
@@ -32,8 +33,9 @@ from endoscope_core.safety import (
 )
 from endoscope_nodes import names
 from endoscope_nodes.client.calibration_result import findings_of, is_of_no_class
+from endoscope_nodes.client.compensator_state import compensator_state, model_in_words
 from endoscope_nodes.nodes.plant_adoption import PlantAdoption, Selection
-from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report, diagnostic_array, status
+from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
 from endoscope_nodes.runtime.node_parameters import FOR_SESSION, CompensatorParameters
@@ -72,21 +74,16 @@ class CompensatorNode(EndoscopeNode):
 
     def __init__(self, context: NodeContext) -> None:
         super().__init__('compensator', context)
-        p = self.parameters(CompensatorParameters, self._on_parameters)
-        self._settings = p
+        p = self._settings = self.parameters(CompensatorParameters, self._on_parameters)
         facts, motors = self.rig.joints, self.rig.motors
         timeout_ns = self.rig.timeouts.command_ns
-        self.gate = CommandGate(
-            CommandLimits(facts.reach, facts.speed, facts.entry_step, timeout_ns)
-        )
-        self.calibration_gate = CommandGate(
-            CommandLimits(facts.reach, facts.speed, facts.entry_step, timeout_ns)
-        )
+        limits = CommandLimits(facts.reach, facts.speed, facts.entry_step, timeout_ns)
+        self.gate, self.calibration_gate = CommandGate(limits), CommandGate(limits)
         self.correction_gate = CommandGate(
             CommandLimits(facts.correction, motors.speed / facts.gear, facts.correction, timeout_ns)
         )
-        limits = (facts.drive * facts.gear, motors.speed, motors.acceleration, motors.step)
-        self.shaper = MotionShaper(MotionLimits.either_way(len(names.MOTORS), *limits))
+        most = (facts.drive * facts.gear, motors.speed, motors.acceleration, motors.step)
+        self.shaper = MotionShaper(MotionLimits.either_way(len(names.MOTORS), *most))
         settings = FeedforwardSettings(
             MotorLimits.of(self.rig), lead=p.lead, speed_limit=motors.speed / facts.gear
         )
@@ -94,21 +91,17 @@ class CompensatorNode(EndoscopeNode):
         self._passing = Feedforward(len(names.JOINTS), settings)
         self._desired = DesiredMotion(len(names.JOINTS))
         self._choice = LawChoice(len(names.JOINTS), p.parameter_sets, p.table)
-        self._compiled: set[str] = set()
         self._trouble = self._load()
         self.findings: CalibrationFindings | None = None
         self._found: CalibrationFindings | None = None
         self._news = False
         self._calibrated_in = ''
-        self._learnt_ns = 0
+        self._learnt_ns = self._last_stamp_ns = self._moved_ns = 0
         self._source = NOBODY
-        self._last_stamp_ns = 0
-        self._sent = self._rested_at = _AT_ZERO
-        self._moved_ns = 0
-        self._angle: tuple[float, ...] = _AT_ZERO
+        self._sent = self._rested_at = self._angle = _AT_ZERO
         self._by_adopted = False
         self._answer = StandingStill(names.MOTORS, self.rig.motors.resolution)
-        self._corrections: tuple[JointSample | None, JointSample | None] = (None, None)
+        self._corrections = Corrections(timeout_ns)
         self._corrected = False
         self._beyond_range = self._beyond_before = 0
         self._state_is_news = True
@@ -134,12 +127,11 @@ class CompensatorNode(EndoscopeNode):
         self._adoption = PlantAdoption(
             self, self._session, self._obstacle, self._selection, self._reselect, self._ranges
         )
-        self.diagnostics.add('commands', CommandReport(self.gate, self.ticker, self._session.leave))
-        self.diagnostics.add(
-            'calibration commands', CommandReport(self.calibration_gate, self.ticker)
-        )
-        self.diagnostics.add('corrections', CommandReport(self.correction_gate, self.ticker))
-        self.diagnostics.add('output', self._report)
+        add, ticker = self.diagnostics.add, self.ticker
+        add('commands', CommandReport(self.gate, ticker, self._session.leave))
+        add('calibration commands', CommandReport(self.calibration_gate, ticker))
+        add('corrections', CommandReport(self.correction_gate, ticker))
+        add('output', self._report)
         self.ticker.every(TURN_S, self._watch_motion)
         self.ticker.every(0.1, self._publish_state)
 
@@ -175,15 +167,8 @@ class CompensatorNode(EndoscopeNode):
                 AdoptionCode.NOT_MEASURED, f'{names.MOTOR_MEASURED} is silent: no pose is known'
             )
         before = self._angle if self._source == names.MASTER_NODE else bending
-        joint = None if plant is None else plant.outside(before)
-        if plant is not None and joint is not None:
-            within = ranges_in_words(
-                plant.ranges[joint : joint + 1], names.JOINTS[joint : joint + 1]
-            )
-            raise AdoptionError(
-                AdoptionCode.BEYOND_RANGE,
-                f'{names.JOINTS[joint]} is at {np.degrees(before[joint]):.0f} deg; {within}',
-            )
+        if plant is not None:
+            plant.check_within(before, names.JOINTS)
 
     def _on_result(self, message: DiagnosticArray) -> None:
         found = findings_of(message)
@@ -213,20 +198,11 @@ class CompensatorNode(EndoscopeNode):
     def _load(self) -> str:
         """Load what the first command would wait for; why the mode is not available."""
         try:
-            self._compile(self._choice.law(self._settings.mode, BY_CLASS, _ANY_CLASS))
+            law = self._choice.law(self._settings.mode, BY_CLASS, _ANY_CLASS)
+            self._feedforward.compile(law)
         except EndoscopeError as error:
             return str(error)
         return ''
-
-    def _compile(self, law: FeedforwardLaw) -> None:
-        """Compile a mode before a command needs it, once."""
-        if law.mode in self._compiled:
-            return
-        trial = Feedforward(len(names.JOINTS), self._feedforward.settings)
-        trial.select(law)
-        trial.step(_NOTHING, _NOTHING, 1e-3)
-        trial.measure(0.0, _NOTHING)
-        self._compiled.add(law.mode)
 
     def _select_law(self) -> None:
         """Put mode and findings in force; without findings nothing is compensated."""
@@ -241,7 +217,7 @@ class CompensatorNode(EndoscopeNode):
             except EndoscopeError as error:
                 self._trouble = str(error)
         if law != self._feedforward.law:
-            self._compile(law)
+            self._feedforward.compile(law)
             self._feedforward.select(law)
         self._by_adopted = adopted is not None and law == adopted.law
         self._state_is_news = True
@@ -260,7 +236,7 @@ class CompensatorNode(EndoscopeNode):
     def _restart(self) -> None:
         for gate in (self.gate, self.calibration_gate, self.correction_gate):
             gate.reset()
-        self._corrections = (None, None)
+        self._corrections.restart()
         self._source = NOBODY
         self._motors.session = self._session.name
 
@@ -299,7 +275,7 @@ class CompensatorNode(EndoscopeNode):
     def _on_correction(self, sample: JointSample) -> None:
         now = self.ticker.monotonic_ns()
         if self.correction_gate.check(sample.stamp_ns, sample.position, now, _AT_ZERO) is None:
-            self._corrections = (self._corrections[1], sample)
+            self._corrections.add(sample.stamp_ns, sample.position)
 
     def _on_master(self, sample: JointSample) -> None:
         if self.calibration_gate.is_fresh(self.ticker.monotonic_ns()):
@@ -310,7 +286,9 @@ class CompensatorNode(EndoscopeNode):
         step = self._obey(names.MASTER_NODE, self.gate, sample, self._pose.bending())
         if step is None:
             return
-        correction = self._correction(sample.stamp_ns)
+        # This mode learns from the tracker itself.
+        learns = self._feedforward.law.mode == ADAPTIVE_PHYSICAL
+        correction = None if learns else self._corrections.before(sample.stamp_ns)
         if step.begins:
             self._desired.restart()
         added = _NOTHING if correction is None else correction
@@ -319,21 +297,16 @@ class CompensatorNode(EndoscopeNode):
             self._feedforward.rebase(
                 self._drive_before() - added, sample.position if step.begins else None
             )
-        within = self._within_range(sample)
+        # Cut where the tube at hand lets the tip bend no more.
+        within = keep_within(self._ranges(), sample.position, sample.velocity)
         self._angle = within[0]
+        self._beyond_range += self._angle != sample.position
         angle, velocity = self._desired.follow(*within, step.seconds)
         if self._news and not any(velocity):
             self._take_news()
         self._learn(sample.stamp_ns)
         drive = self._feedforward.step(angle, velocity, step.seconds) + added
         self._put_out(sample.stamp_ns, drive, step.seconds)
-
-    def _within_range(self, sample: JointSample) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Desired angles and velocities, cut where the tube at hand lets the tip bend no more."""
-        angle, velocity = keep_within(self._ranges(), sample.position, sample.velocity)
-        if angle != sample.position:
-            self._beyond_range += 1
-        return angle, velocity
 
     def _on_calibration(self, sample: JointSample) -> None:
         shafts = self._pose.shafts()
@@ -374,17 +347,6 @@ class CompensatorNode(EndoscopeNode):
         self._answer.restart()
         return _Step(TICK_S, begins=True)
 
-    def _correction(self, stamp_ns: int) -> np.ndarray | None:
-        """Newest correction from before this command: which one must not depend on chance."""
-        # This mode learns from the tracker itself.
-        if self._feedforward.law.mode == ADAPTIVE_PHYSICAL:
-            return None
-        for sample in reversed(self._corrections):
-            if sample is not None and sample.stamp_ns < stamp_ns:
-                fresh = (stamp_ns - sample.stamp_ns) <= self.rig.timeouts.command_ns
-                return np.array(sample.position) if fresh else None
-        return None
-
     def _put_out(self, stamp_ns: int, drive: np.ndarray, dt: float) -> None:
         gear = self.rig.joints.gear
         self._sent = self.shaper.shape([gear * angle for angle in drive.tolist()], dt)
@@ -402,37 +364,17 @@ class CompensatorNode(EndoscopeNode):
         if now == 0 or not self._state_is_news:
             return
         self._state_is_news = False
-        law = self._feedforward.law
-        values: dict[str, object] = {
-            'mode': law.mode,
-            'wanted_mode': self._settings.mode,
-            'selected_by': self._settings.selected_by,
-            'lead': self._settings.lead,
-            'gear': self.rig.joints.gear,
-        }
-        if self.findings is not None and self.findings.class_deg is not None:
-            values['class_deg'] = self.findings.class_deg
-        for joint, parameters in zip(names.JOINTS, law.parameters, strict=False):
-            values |= {f'{joint}.{key}': value for key, value in parameters.to_dict().items()}
-        said = status('compensator: model', OK, self._model_in_words(), values)
-        self._states.publish(diagnostic_array(now, said))
+        law, gear = self._feedforward.law, self.rig.joints.gear
+        words = self._model_in_words()
+        self._states.publish(
+            compensator_state(now, law, self._settings, gear, self.findings, words)
+        )
 
     def _model_in_words(self) -> str:
-        if self._settings.mode == 'none':
-            return 'no feed-forward'
-        if self._trouble:
-            return f'no feed-forward: {self._trouble}'
-        if self._settings.selected_by == BY_ADOPTED and self._adoption.plant is not None:
-            return f'{self._settings.mode} by adopted: plant {self._adoption.plant.hash}'
-        if self.findings is None:
-            return (
-                f'no feed-forward: {self._settings.mode} waits for a calibration; '
-                f'{self.operate("calibrate")}'
-            )
-        return f'{self._settings.mode} by {self._settings.selected_by}: {_in_words(self.findings)}'
+        plant, remedy = self._adoption.plant, self.operate('calibrate')
+        return model_in_words(self._settings, self._trouble, plant, self.findings, remedy)
 
     def close(self) -> None:
-        """Let the thread end in which plants are tried."""
         self._adoption.close()
 
     def _report(self) -> Report:
@@ -444,24 +386,13 @@ class CompensatorNode(EndoscopeNode):
         if beyond:
             level = max(level, WARN)
             said += f'; {ranges_in_words(self._ranges(), names.JOINTS)}, more was asked for'
-        return (
-            level,
-            said,
-            {
-                'cut to the reach': self._beyond_range,
-                'source': self._source,
-                'published': self._motors.count,
-                'corrected': self._corrected,
-                'bounded': self.shaper.bounded,
-                'learnt': ' '.join(
-                    f'{learnt.joint.capstan_exponent:.3f}' for learnt in self._feedforward.learnt
-                ),
-            },
-        )
-
-
-def _in_words(findings: CalibrationFindings) -> str:
-    parts = [] if findings.class_deg is None else [f'class {findings.class_deg} deg']
-    if findings.size is not None:
-        parts.append(f'size {np.degrees(findings.size):.1f} deg')
-    return ', '.join([*parts, *(['plant identified'] if findings.plants else [])])
+        learnt = (f'{each.joint.capstan_exponent:.3f}' for each in self._feedforward.learnt)
+        values: dict[str, object] = {
+            'cut to the reach': self._beyond_range,
+            'source': self._source,
+            'published': self._motors.count,
+            'corrected': self._corrected,
+            'bounded': self.shaper.bounded,
+            'learnt': ' '.join(learnt),
+        }
+        return level, said, values

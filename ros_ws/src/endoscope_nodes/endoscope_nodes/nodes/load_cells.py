@@ -13,10 +13,10 @@ from endoscope_devices.load_cells import (
     tare_path,
 )
 from endoscope_nodes import names
+from endoscope_nodes.runtime.device_parameters import LoadCellsParameters
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, STALE, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
-from endoscope_nodes.runtime.node_parameters import LoadCellsParameters
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import LOCK_STEP, SENSOR_ASKED, SENSOR_OFFERED
 from endoscope_nodes.runtime.streams import JointPublisher, JointSample, JointSubscription
@@ -61,7 +61,6 @@ class LoadCellsNode(EndoscopeNode):
 
     @property
     def announcement(self) -> str:
-        """Name the device."""
         return f'load cells {self._device_name}'
 
     def _connect(self, device: str, p: LoadCellsParameters) -> LoadCellDevice:
@@ -132,6 +131,5 @@ class LoadCellsNode(EndoscopeNode):
         return OK, 'reading', values
 
     def close(self) -> None:
-        """Let go of the transmitter."""
         if self._cells is not None:
             self._cells.close()

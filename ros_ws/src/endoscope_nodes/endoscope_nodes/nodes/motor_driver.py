@@ -15,10 +15,10 @@ from endoscope_devices.dynamixel.dynamixel_motors import DynamixelMotors
 from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
 from endoscope_devices.simulated_slave import SimulatedSlave
 from endoscope_nodes import names
+from endoscope_nodes.runtime.device_parameters import DynamixelParameters, MotorDriverParameters
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
-from endoscope_nodes.runtime.node_parameters import DynamixelParameters, MotorDriverParameters
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import COMMAND, LOCK_STEP, RESULT, SENSOR_OFFERED
 from endoscope_nodes.runtime.streams import JointPublisher, JointSample, JointSubscription
@@ -111,7 +111,6 @@ class MotorDriverNode(EndoscopeNode):
 
     @property
     def announcement(self) -> str:
-        """Name the device."""
         return f'motors {self._device_name}'
 
     def _describe_rig(self, context: NodeContext) -> RigKind:
@@ -238,7 +237,6 @@ class MotorDriverNode(EndoscopeNode):
         return OK, 'holding' if self.motion.holding else 'following commands', values
 
     def close(self) -> None:
-        """Let go of the device."""
         self._device.close()
 
 

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 
 from diagnostic_msgs.msg import DiagnosticArray
 
@@ -12,6 +12,7 @@ from endoscope_core.safety import AdoptionCode, BendingRange
 from endoscope_nodes import names
 from endoscope_nodes.client.order_feedback import OrderState
 from endoscope_nodes.client.plant_adoption import AdoptionRequest, PlantInForce
+from endoscope_nodes.runtime.beside import Beside
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_parameters import FOR_SESSION
 from endoscope_nodes.runtime.qos import EVENT, RESULT
@@ -59,7 +60,7 @@ class PlantAdoption:
         self._before: list[_Before] = []
         self._request: AdoptionRequest | None = None
         self._trying: Future[AdoptedPlant] | None = None
-        self._thread = ThreadPoolExecutor(1)
+        self._beside = Beside(node.ticker)
         self._told = PlantInForce()
         self._news = True
         self._out = node.create_publisher(DiagnosticArray, names.COMPENSATOR_PLANT, RESULT)
@@ -70,7 +71,6 @@ class PlantAdoption:
         node.ticker.every(_LOOK_S, self._look)
 
     def tell(self) -> None:
-        """Say anew what is in force."""
         self._news = True
 
     def end_session(self) -> None:
@@ -79,8 +79,7 @@ class PlantAdoption:
             self.plant = self._before.pop().plant
 
     def close(self) -> None:
-        """Let the thread end in which plants are tried."""
-        self._thread.shutdown()
+        self._beside.close()
 
     def _on_rivals(self, rivals: str) -> None:
         """A second sender moves nothing, and neither does the first while he is there."""
@@ -107,18 +106,9 @@ class PlantAdoption:
             return
         self._request = request
         self._say(request, OrderState.EXECUTING, 'trying the plant')
-        ticker = self._node.ticker
-        if ticker.paced or not ticker.simulated:
-            self._trying = self._thread.submit(self._try, request.plant)
-            return
-        self._trying = Future()
-        try:
-            self._trying.set_result(self._try(request.plant))
-        except AdoptionError as error:
-            self._trying.set_exception(error)
-
-    def _try(self, text: str) -> AdoptedPlant:
-        return adopted_plant(text, self._node.rig, names.JOINTS)
+        self._trying = self._beside.submit(
+            adopted_plant, request.plant, self._node.rig, names.JOINTS
+        )
 
     def _check(self, request: AdoptionRequest) -> None:
         """Refuse who may not ask, or asks at the wrong time."""

@@ -1,7 +1,7 @@
 """Watches whether the rig that moves is still the one that its plant describes, and tells."""
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
@@ -24,6 +24,7 @@ from endoscope_core.physics.plant_file import plant_from_mapping
 from endoscope_core.schema import parse_yaml
 from endoscope_nodes import names, topics
 from endoscope_nodes.client.plant_adoption import PlantInForce
+from endoscope_nodes.runtime.beside import Beside
 from endoscope_nodes.runtime.diagnostics import OK, STALE, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext, load_slave
@@ -120,7 +121,7 @@ class WatchNode(EndoscopeNode):
         }
         self._marks = self.create_publisher(String, names.RECORDER_MARK, EVENT)
         self.create_subscription(DiagnosticArray, names.COMPENSATOR_PLANT, self._on_plant, RESULT)
-        self._thread = ThreadPoolExecutor(1)
+        self._beside = Beside(self.ticker)
         self._judging: Future[None] | None = None
         self.ticker.every(BLOCK_S, self._look)
 
@@ -139,7 +140,6 @@ class WatchNode(EndoscopeNode):
 
     @property
     def announcement(self) -> str:
-        """Say that it watches."""
         return f'watching for a rig other than {self._source}' if self._active else ''
 
     def _on_plant(self, message: DiagnosticArray) -> None:
@@ -160,16 +160,11 @@ class WatchNode(EndoscopeNode):
                 return
             self._judging.result()
         self._tell()
+        work = self._begin if self._wanted else self._judge
         if self._wanted:
             self._wanted = False
             self._told, self._kept = {}, set()
-            work = self._begin
-        else:
-            work = self._judge
-        if self.ticker.simulated and not self.ticker.paced:
-            work()
-        else:
-            self._judging = self._thread.submit(work)
+        self._judging = self._beside.submit(work)
 
     def _begin(self) -> None:
         """Learn anew, with the plant in force."""
@@ -259,7 +254,7 @@ class WatchNode(EndoscopeNode):
     def close(self) -> None:
         """Let the thread end, and leave the topics."""
         if self._active:
-            self._thread.shutdown()
+            self._beside.close()
         for stream in self._streams.values():
             stream.subscription.close()
 

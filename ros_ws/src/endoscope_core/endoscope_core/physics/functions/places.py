@@ -9,9 +9,23 @@ from dataclasses import KW_ONLY, dataclass
 from enum import StrEnum
 from typing import Any
 
-from endoscope_core.compiled import Array, compiled
 from endoscope_core.errors import InputError, nearest
 from endoscope_core.physics.effect import Effect, Parameter, Stage, Traits, in_order_of_chain
+from endoscope_core.physics.functions.states import (
+    angle_less_lagged,
+    angular_speed,
+    both_tensions,
+    lagged_speed,
+    lagged_tension,
+    now,
+    opposite,
+    other_angle,
+    own_angle,
+    path,
+    per_tick,
+    tension_difference,
+    unit_slope,
+)
 from endoscope_core.physics.hooks import (
     COMMAND,
     EFFORT,
@@ -30,18 +44,6 @@ from endoscope_core.physics.hooks import (
     Fold,
     Function,
     Hook,
-)
-from endoscope_core.physics.layout import (
-    JOINT,
-    LAGGED_ANGLE,
-    LAGGED_LOAD,
-    LAGGED_SPEED,
-    MEAN_TENSION,
-    NOW,
-    OTHER,
-    PATH,
-    REST_TENSION,
-    TENSION_DIFFERENCE,
 )
 
 NODES = 41
@@ -123,7 +125,6 @@ class Place(Effect):
 
     @property
     def is_factor(self) -> bool:
-        """Whether the plant takes the exponential of the function as a factor."""
         return self.hook.fold is Fold.FACTORS
 
 
@@ -200,74 +201,6 @@ READING = Argument('T', 'the tension at the motor', 'N', 0.0, 30.0)
 NEIGHBOUR = Argument('T', 'the tension of the other wire at the motor', 'N', 0.0, 30.0)
 CYCLE = Argument('t', 'time since the start, one cycle of it', 's', 0.0, 4.0)
 CYCLE_OF_SHAFT = Argument('m', "the shaft's angle, one cycle of it", 'rad', 0.0, math.pi / 6.0)
-
-
-# Arguments, and what else of places depends on arguments of their hooks.
-
-
-@compiled
-def own_angle(x: Array) -> float:
-    return x[JOINT]
-
-
-@compiled
-def other_angle(x: Array) -> float:
-    return x[OTHER]
-
-
-@compiled
-def both_tensions(x: Array) -> float:
-    return x[MEAN_TENSION]
-
-
-@compiled
-def tension_difference(x: Array) -> float:
-    return x[TENSION_DIFFERENCE]
-
-
-@compiled
-def path(x: Array) -> float:
-    return x[PATH]
-
-
-@compiled
-def now(x: Array) -> float:
-    return x[NOW]
-
-
-@compiled
-def lagged_speed(x: Array) -> float:
-    return x[LAGGED_SPEED]
-
-
-@compiled
-def lagged_tension(x: Array, wire: int) -> float:
-    return x[LAGGED_LOAD + wire] - x[REST_TENSION]
-
-
-@compiled
-def angle_less_lagged(x: Array, angle: float) -> float:
-    return angle - x[LAGGED_ANGLE]
-
-
-@compiled
-def angular_speed(step: float, tick: float) -> float:
-    return step / tick
-
-
-@compiled
-def per_tick(tick: float) -> float:
-    return 1.0 / tick
-
-
-@compiled
-def unit_slope() -> float:
-    return 1.0
-
-
-@compiled
-def opposite(wire: int) -> float:
-    return 1.0 - 2.0 * wire
 
 
 def _actuator() -> None:

@@ -1,0 +1,61 @@
+"""What the tensions of a calibration say of the tube: its class, and the plant of each joint."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.classifier.classification import (
+    PLANT_DEVIATION,
+    ClassificationResult,
+    Classifier,
+    UnseenTensionError,
+    is_of_a_class,
+    of_size,
+)
+from endoscope_core.control import PhysicalParameters
+from endoscope_core.identification.plant_fit import (
+    fits_of_calibration,
+    lost_pretension,
+    plants_of_calibration,
+    size_of_explained,
+)
+from endoscope_core.signals import CALIBRATION_RATE, CalibrationMotion
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """A tube, as the tensions of one calibration show it."""
+
+    verdict: ClassificationResult
+    plants: tuple[PhysicalParameters, ...] = ()  # of each joint; empty where not identified
+    # What each joint's wires have lost of their pretension in N, where the plant named the class.
+    lost: list[float] | None = None
+
+
+def judged(
+    classifier: Classifier,
+    motion: CalibrationMotion,
+    tension: NDArray[np.float64],
+    gear: float,
+    identify_plant: bool,
+) -> Judgement:
+    """Judge tensions (N, 4) in N at 1 kHz: by the plant where the classifier knows none such.
+
+    UnseenTensionError where neither explains them.
+    """
+    command, _ = motion.signal(np.arange(len(tension)) / CALIBRATION_RATE)
+    try:
+        verdict = classifier.classify(tension)
+    except UnseenTensionError:
+        if not identify_plant:
+            raise
+        fits = fits_of_calibration(command, tension, gear)
+        size = size_of_explained(fits, gear)
+        if size is None or not is_of_a_class(size, classifier.classes_deg):
+            raise
+        verdict = of_size(size, PLANT_DEVIATION, classifier.classes_deg)
+        return Judgement(verdict, tuple(fit.parameters for fit in fits), lost_pretension(fits))
+    if not identify_plant:
+        return Judgement(verdict)
+    return Judgement(verdict, plants_of_calibration(command, tension, gear))
