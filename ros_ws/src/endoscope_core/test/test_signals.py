@@ -83,14 +83,6 @@ def test_papers_signals_have_their_form_while_steady():
     np.testing.assert_allclose(non_periodic_signal()(time)[0], expected, atol=1e-12)
 
 
-<<<<<<< HEAD
-def test_commissioning_moves_one_joint_alone_first():
-    motion = motion_by_name('commissioning')
-    angle, _ = motion.sample(np.arange(0.0, 0.4 * motion.duration, 0.01))
-    assert np.ptp(angle[:, 0]) > 1.0
-    assert np.ptp(angle[:, 1]) == 0.0
-
-
 @pytest.mark.parametrize('joint', [0, 1])
 def test_commissioning_has_wide_strokes_twice_a_hold_and_a_small_loop(joint):
     motion = motion_by_name('commissioning')
@@ -106,20 +98,6 @@ def test_commissioning_has_wide_strokes_twice_a_hold_and_a_small_loop(joint):
     assert np.any((strokes > 9.0) & (strokes < 15.0) & (np.abs(turned[1:]) < 15.0))
 
 
-def test_a_jump_between_pieces_is_refused():
-    with pytest.raises(ValueError, match='jumpy: hold begins'):
-        sequence('jumpy', [move(0.0, 1.0, 1.0), hold(1.0)])
-
-
-def test_a_signal_without_steady_part_is_refused():
-    with pytest.raises(ValueError, match='too short'):
-        sum_of_sines('brief', [(1.0, 1.0)], 2.0)
-
-
-def test_an_unknown_motion_names_the_nearest():
-    with pytest.raises(ValueError, match="nearest is 'periodic'"):
-        motion_by_name('periodik')
-=======
 @pytest.mark.parametrize(
     ('make', 'complaint'),
     [
@@ -131,4 +109,3 @@ def test_an_unknown_motion_names_the_nearest():
 def test_what_is_no_motion_is_refused(make, complaint):
     with pytest.raises(ValueError, match=complaint):
         make()
->>>>>>> def2ebb3f89927dce3ac9eec15e5b5b2a0a0285b
