@@ -58,3 +58,10 @@ def test_the_catalogue_as_json(capsys):
     assert (moment['unit'], moment['high']) == ('N m', 0.1)
     assert main(['effects', '--plant', '--json']) == 0
     assert plant_from_mapping(json.loads(capsys.readouterr().out)) == PlantDescription()
+
+
+def test_tells_of_a_place(capsys):
+    assert main(['effects', 'load_of_speed']) == 0
+    told = ' '.join(capsys.readouterr().out.split())
+    assert "f(w), odd, w = the joint's angular speed" in told
+    assert 'w -10 to 10 rad/s where no range is given' in told

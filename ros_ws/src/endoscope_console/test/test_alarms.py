@@ -31,6 +31,8 @@ def test_a_fault_stays_until_it_was_seen_others_go_with_their_cause():
 
 def test_to_have_seen_it_does_not_mend_it():
     alarms = Alarms()
+    with pytest.raises(EndoscopeError, match='nothing'):
+        alarms.acknowledge('fault')
     alarms.update(of(FAULT))
     with pytest.raises(EndoscopeError, match=f'still present: {FAULT.text}'):
         alarms.acknowledge('fault')

@@ -98,3 +98,40 @@ def test_the_other_joint_winds_up_this_ones_wires():
     expected = by_wires * 0.3 * 0.4 / (by_wires + STIFFNESS)
     assert bent.bending[-1] == pytest.approx(expected, rel=1e-4)
     assert bent.a[-1] - 5.0 == pytest.approx(3000.0 * 0.0008 * (0.12 - expected), rel=1e-4)
+
+
+LONG = TICK * np.arange(8000)
+FULL = 9e-4 / STIFFNESS
+LOAD = {'moment_nm': 9e-4, 'time_s': 1.0}
+
+
+def bent(**given):
+    """Bending angle (8000,) of a section under a load that goes and comes again."""
+    return run(np.zeros(8000), {'external_load': LOAD | given}, **LOOSE).bending
+
+
+def test_a_load_goes_when_it_has_been_held():
+    angle = bent(hold_s=2.0)
+    np.testing.assert_allclose(angle[(LONG > 1.1) & (LONG < 2.99)], FULL, atol=1e-6)
+    np.testing.assert_allclose(angle[(LONG < 0.99) | (LONG > 3.1)], 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize('duration', [0.0, 0.3])
+def test_a_load_comes_again_every_period(duration):
+    angle = bent(hold_s=0.5, period_s=1.5, duration_s=duration)
+    for onset in (1.0, 2.5, 4.0, 5.5, 7.0):
+        inside = np.abs(LONG - onset - 0.25) < 0.25 - duration / 2.0 - 0.02
+        outside = np.abs(LONG - onset - 1.0) < 0.5 - duration / 2.0 - 0.03
+        np.testing.assert_allclose(angle[inside], FULL, atol=1e-3)
+        np.testing.assert_allclose(angle[outside], 0.0, atol=1e-3)
+    assert np.abs(angle[LONG < 0.8]).max() < 1e-9
+
+
+def test_a_load_that_is_held_longer_than_its_period_stays():
+    angle = bent(hold_s=1.6, period_s=1.5, duration_s=0.2)
+    np.testing.assert_allclose(angle[LONG > 1.2], FULL, atol=1e-6)
+
+
+def test_its_moment_has_no_jump_where_a_pulse_follows_another():
+    angle = bent(hold_s=0.9, period_s=1.0, duration_s=0.6)
+    assert np.abs(np.diff(angle)).max() < 3.0 * FULL / 600.0

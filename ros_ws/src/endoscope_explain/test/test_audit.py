@@ -5,6 +5,7 @@ import pytest
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit import Severity, audit_recording
+from endoscope_explain.audit.stamps import retimed
 from endoscope_explain.audit.wrong_samples import spike_chance
 
 PLANT = PlantDescription()
@@ -240,3 +241,8 @@ def test_a_skewed_clock_shows_in_the_times_of_receipt(sound, skew):
     assert finding.signals == ('slave/measured_js',)
     assert finding.parameters['skew'].value == pytest.approx(skew, rel=0.05)
     assert report.recording.bending.time == pytest.approx(sound.bending.time, abs=1e-3)
+
+
+def test_retiming_undoes_a_skew(sound):
+    fast = replace(sound.bending, time=1.0 + 1.01 * (sound.bending.time - 1.0))
+    assert retimed(fast, 0.01, start=1.0).time == pytest.approx(sound.bending.time)

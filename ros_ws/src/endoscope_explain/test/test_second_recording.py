@@ -8,7 +8,7 @@ import pytest
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.rig import shipped_rig
-from endoscope_explain.compare import confirmed_by
+from endoscope_explain.compare import confirmed_by, ladders
 from endoscope_explain.explanation import Verdict
 from endoscope_explain.pipeline import Inputs, Sources, explain_case
 from endoscope_explain.report.html_page import html_page
@@ -124,3 +124,12 @@ def test_of_a_joint_that_rests_in_the_second_recording_nothing_is_said(record, s
     (effect,) = confirmed_by(second, stribeck_case.explanation)
     assert not effect.doubtful
     assert 'second_p_value' not in effect.evidence
+
+
+def test_plants_are_judged_on_a_second_recording(stribeck_case, record):
+    explanation = stribeck_case.explanation
+    second = record(explanation.augmented, duration=8.0, seed=9)
+    for ladder in ladders(explanation, second):
+        assert set(ladder) == {'nominal', 'refitted', 'augmented'}
+        left = {name: fits['wires/measured_js:wire_x_pos'].ratio for name, fits in ladder.items()}
+        assert left['augmented'] < 1.5 < left['refitted']

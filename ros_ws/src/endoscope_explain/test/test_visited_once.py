@@ -22,6 +22,8 @@ def fall(revisited, low=-1.0, high=1.0):
 def test_of_what_was_made_twice_nothing_is_said():
     assert once_only('bend_x', [rise(1.0), fall(0.9), rise(0.8), fall(1.0)]) == ''
     assert once_only('bend_x', []) == ''
+    # Nor of the first stroke, from the middle.
+    assert once_only('bend_x', [rise(0.0, low=0.0), fall(1.0), rise(1.0)]) == ''
 
 
 def test_strokes_that_were_made_once_only_are_named_in_degrees():

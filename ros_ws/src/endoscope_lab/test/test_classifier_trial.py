@@ -6,7 +6,8 @@ import pytest
 from endoscope_core.classifier.classification import UnseenTensionError
 from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
-from endoscope_lab.dataset import record_calibration
+from endoscope_lab.dataset import CLASSES_DEG, record_calibration
+from endoscope_lab.papers.calibrations import judged_at_rate, tubes_of_classes
 from endoscope_lab.papers.tracking_trial import never_seen_tube
 from endoscope_lab.training.held_out_calibration import STRANGE
 
@@ -39,3 +40,15 @@ def test_unusual_tensions_are_refused_with_a_reason(shipped, kind):
     tension = STRANGE[kind](tension.astype(np.float32), generator)
     with pytest.raises(UnseenTensionError, match='none of the classes: '):
         shipped.classify(tension)
+
+
+def test_at_any_rate_every_class_is_found_and_what_is_no_known_tube_refused(shipped):
+    tubes = tubes_of_classes(7, 1, calibration_motion(shipped.motion))
+    for rate in (100, 450, 1000):
+        found = [judged_at_rate(shipped, tubes, k, rate, 7 + k) for k in range(7)]
+        assert [each.class_deg for each in found] == list(CLASSES_DEG)
+        assert np.rad2deg(np.abs([e.size for e in found] - tubes.size)).max() < 3.0
+    # A cell that clips above three quarters of its peak passes at any rate.
+    for kind in ('slack', 'stuck', 'unplugged', 'exchanged in a joint'):
+        assert judged_at_rate(shipped, tubes, 2, 100, 2, kind=kind) is None
+    assert judged_at_rate(shipped, tubes, 0, 50, 7) is None, 'too seldom'

@@ -38,18 +38,23 @@ def test_sections_may_be_nested(check):
         check('endoscope:\n  recoder:\n    ros__parameters: {autostart: false}\n')
 
 
-@pytest.mark.parametrize('section', ['/**/recoder', '/endoscope/recoder', '/arm1/recoder'])
-def test_a_misspelt_node_is_refused_wherever_it_might_be(check, section):
-    with pytest.raises(ParameterError, match=r"given\.yaml: section .* did you mean 'recorder'"):
-        check(f'{section}:\n  ros__parameters: {{autostart: false}}\n')
-
-
-@pytest.mark.parametrize('section', ['recorder', '/master'])
-def test_a_node_without_its_namespace_is_refused(check, section):
-    name = section.strip('/')
-    with pytest.raises(ParameterError, match=f"write '/endoscope/{name}' or '/\\*\\*/{name}'"):
+@pytest.mark.parametrize(
+    ('section', 'said'),
+    [
+        ('/**/recoder', "did you mean 'recorder'"),
+        ('/endoscope/recoder', "did you mean 'recorder'"),
+        ('/arm1/recoder', "did you mean 'recorder'"),
+        ('recorder', r"write '/endoscope/recorder' or '/\*\*/recorder'"),
+        ('/master', r"write '/endoscope/master' or '/\*\*/master'"),
+    ],
+)
+def test_a_section_that_reaches_no_node_is_refused(check, section, said):
+    with pytest.raises(ParameterError, match=rf'given\.yaml: section .* {said}'):
         check(f'{section}:\n  ros__parameters: {{bag: a}}\n')
-    assert check(f'{section}:\n  ros__parameters: {{bag: a}}\n', namespace='/') == []
+
+
+def test_a_node_without_its_namespace_is_one_at_the_top(check):
+    assert check('recorder:\n  ros__parameters: {bag: a}\n', namespace='/') == []
 
 
 def test_what_is_for_another_rig_is_said(check):

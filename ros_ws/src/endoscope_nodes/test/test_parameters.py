@@ -3,6 +3,7 @@ from dataclasses import dataclass
 
 import pytest
 from rclpy.context import Context
+from rclpy.parameter import Parameter
 
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.parameters import ParameterError, parameter
@@ -86,3 +87,14 @@ def test_one_for_all_must_be_known_to_one_only():
         assert nodes[0].settings.gain == 2.0
     with pytest.raises(ParameterError, match='gian'):
         start(Example, Other, args=['-p', 'gian:=2.0'])
+
+
+def test_a_dynamic_parameter_changes_and_a_wrong_value_does_not():
+    runtime, (node,) = start(Example)
+    with runtime:
+        assert node.set_parameters([Parameter('gain', value=2.0)])[0].successful
+        assert node.changes == [Settings(gain=2.0)]
+        for bad in (math.nan, 9.0, 2.5):
+            assert not node.set_parameters([Parameter('gain', value=bad)])[0].successful
+        assert not node.set_parameters([Parameter('count', value=5)])[0].successful
+        assert node.changes == [Settings(gain=2.0)]

@@ -42,6 +42,12 @@ def test_every_reading_lies_in_its_band(count, seed):
     assert np.all(values[known] <= high[place][known])
 
 
+def test_bands_of_neighbours_touch():
+    """So that a steep line is not drawn as loose dashes."""
+    _, low, high = banded(LONG, LONG**3)
+    assert np.all(low[1:] <= high[:-1])
+
+
 def test_a_stretch_without_readings_is_a_gap():
     values = np.ones_like(LONG)
     values[10_000:20_000] = np.nan

@@ -35,6 +35,12 @@ def test_a_rise_from_another_turn_is_another_branch():
     assert seen[round(1.3 * CYCLE / 0.02) :].mean() > 0.9
 
 
+def test_the_share_does_not_depend_on_the_tick():
+    command = np.sin(TIME[:9000])
+    coarse = np.mean(seen_before(command[::5], 5e-3))
+    assert coarse == pytest.approx(np.mean(seen_before(command)), abs=0.02)
+
+
 def observation(one_joint, command):
     recording = one_joint.record(one_joint.rig(), command)
     (seen,) = observe(recording, PlantDescription().of_joints(('bend_x',)))
