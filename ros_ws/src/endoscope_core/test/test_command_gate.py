@@ -183,7 +183,7 @@ def test_an_allowance_is_spent_once():
     gate = gate_after(2)
     way, last = 0.0, 0.0
     for k in range(3, 100):
-        wanted = min(1.0, last + 0.05)
+        wanted = 0.05 - last
         if gate.check(20 * k * MS, (wanted, 0.0), (500 + k) * MS, HERE) is None:
             way, last = way + abs(wanted - last), wanted
     assert way <= 10.0 * (0.097 + 0.02)
