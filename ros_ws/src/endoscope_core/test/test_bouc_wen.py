@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from endoscope_core.hysteresis import BoucWenParameters, direct_inverse, forward
-from endoscope_core.hysteresis.bouc_wen import GREATEST_INVERSE_SLOPE
+from endoscope_core.hysteresis.memory_model import GREATEST_INVERSE_SLOPE
 
 SAFE = BoucWenParameters.from_shape(alpha=0.92, lag=0.6, travel=0.4, rho=0.4, n=2.2)
 

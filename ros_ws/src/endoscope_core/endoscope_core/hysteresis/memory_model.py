@@ -100,8 +100,8 @@ def check_inverse(name: str, model: MemoryModel) -> None:
     check_range(name, 'alpha', model.alpha, SMALLEST_ALPHA, GREATEST_ALPHA)
     if not -1e-12 <= model.lag <= GREATEST_LAG * _ROUNDING:
         raise ValueError(
-            f'{name} lag is {math.degrees(model.lag):.1f} deg: it must lie in '
-            f'[0, {math.degrees(GREATEST_LAG):.0f}] deg'
+            f'{name} lag is {math.degrees(model.lag):.1f} deg: it must lie '
+            f'from 0 to {math.degrees(GREATEST_LAG):.0f} deg'
         )
     if model.inverse_slope > GREATEST_INVERSE_SLOPE * _ROUNDING:
         raise ValueError(

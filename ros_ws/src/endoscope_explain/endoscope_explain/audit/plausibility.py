@@ -182,10 +182,6 @@ class Comparison:
             for quantity in self.measured
         }
 
-    def moments(self) -> dict[str, Moments]:
-        """Of each quantity beside what the plant makes of the command as it is read."""
-        return {q: Moments.of(self.measured[q], of) for q, of in self.expected().items()}
-
     def expected(self) -> dict[str, Array]:
         """Simulate the plant on the command as it is read."""
         return self.simulated(self._right())

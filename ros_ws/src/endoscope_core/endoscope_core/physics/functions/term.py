@@ -30,9 +30,8 @@ class Table:
     # (VALUES + NODES or one more,): both ends of the range, then the values, then the time constant
     # of an argument that lags.
     numbers: Array
-    # Of the table against the formula, as shares of what the formula spans; 0 for given values.
+    # Of the table against the formula, as a share of what the formula spans; 0 for given values.
     largest_error: float = 0.0
-    rms_error: float = 0.0
 
 
 @functools.lru_cache(maxsize=256)
@@ -60,7 +59,7 @@ def _tabulated(term: TermSpec, place: Place) -> Table:
     else:
         values = evaluate(term.expression, place.argument.symbol, nodes)
         numbers = np.array([low, high, *values])
-        table = Table(numbers, *_errors(term.expression, place, numbers))
+        table = Table(numbers, _largest_error(term.expression, place, numbers))
     _check_values(place, table, term.multiplies)
     return replace(table, numbers=np.append(table.numbers, _lag(term, place)))
 
@@ -91,24 +90,24 @@ def _range(term: TermSpec, place: Place) -> tuple[float, float]:
     return low, high
 
 
-def _errors(expression: str, place: Place, numbers: Array) -> tuple[float, float]:
+def _largest_error(expression: str, place: Place, numbers: Array) -> float:
     low, high = numbers[:VALUES]
     fine = np.linspace(low, high, (NODES - 1) * FINE + 1)
     true = evaluate(expression, place.argument.symbol, fine)
     span = float(np.ptp(true))
     _check_shape(expression, place, true, span)
     if span == 0.0:
-        return 0.0, 0.0
+        return 0.0
     repeats = place.shape is Shape.PERIODIC
     run = np.array([function_at(numbers, 0, each, 0.0, 1.0, repeats)[0] for each in fine])
     error = np.abs(run - true) / span
-    largest, rms = float(error.max()), float(np.sqrt(np.mean(error**2)))
+    rms = float(np.sqrt(np.mean(error**2)))
     if rms > TOO_MUCH:
         raise ValueError(
             f'{expression!r} is too fine for {NODES} values from {low:g} to {high:g}: its table is '
             f'off by {100.0 * rms:.0f} % of what it spans; give a narrower range'
         )
-    return largest, rms
+    return float(error.max())
 
 
 def _check_shape(expression: str, place: Place, true: Array, span: float) -> None:
