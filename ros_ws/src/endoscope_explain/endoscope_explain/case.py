@@ -70,15 +70,16 @@ def improved_plant(explanation: Explanation, audit: AuditReport) -> PlantDescrip
 
 
 def changed_parameters(estimates: Mapping[str, NominalEstimate]) -> dict[str, NominalEstimate]:
+    """Parameters that differ, the largest change first, and those at a bound after the others."""
     changed = {name: e for name, e in estimates.items() if has_changed(name, e)}
 
-    def reach(item: tuple[str, NominalEstimate]) -> float:
+    def order(item: tuple[str, NominalEstimate]) -> tuple[bool, float]:
         name, e = item
         if nominal_number(name).spread:
-            return abs(e.value - e.nominal)
-        return abs(math.log(e.value / e.nominal))
+            return e.at_bound, -abs(e.value - e.nominal)
+        return e.at_bound, -abs(math.log(e.value / e.nominal))
 
-    return dict(sorted(changed.items(), key=lambda item: -reach(item)))
+    return dict(sorted(changed.items(), key=order))
 
 
 Ladder = Mapping[str, Mapping[str, ChannelFit]]

@@ -53,6 +53,7 @@ class NominalEstimate(Estimate):
     # Whether the recording says more of it than was known before; else the interval is the prior's.
     shown: bool = True
     together_with: str = ''  # number without which the recording does not tell this one
+    at_bound: bool = False  # as far as it may go: the recording asks for more
 
 
 @dataclass(frozen=True)

@@ -109,10 +109,11 @@ def test_without_a_recorded_shaft_there_is_no_cut(record):
     assert cut_at_motor(recording.with_series({'shaft_position': None}), PLANT) == ()
 
 
-def test_what_shows_in_the_load_cells_alone_is_a_sensors(record):
+def test_what_nothing_explains_is_where_the_misfit_begins_along_the_chain(record):
     gain = EffectSpec('load_cell_gain', 'bend_x', {'gain': 1.3})
     stop = EffectSpec('joint_stop', 'bend_x', {'angle_rad': 0.1})
-    for effect, stage in ((gain, 'sensing'), (stop, 'joint')):
+    lag = EffectSpec('actuator_lag', 'bend_x', {'time_constant_s': 0.2})
+    for effect, stage in ((gain, 'sensing'), (stop, 'joint'), (lag, 'actuator')):
         recording = record(dataclasses.replace(PLANT, effects=(effect,)), duration=8.0)
         explanation = Explanation.without_fit(Verdict.UNKNOWN_PHYSICS, PLANT)
         (place,) = locate_unknown(recording, explanation)

@@ -188,6 +188,46 @@ def test_a_number_that_the_recording_does_not_show_has_words_in_place_of_an_inte
     ]
 
 
+def test_a_number_at_a_bound_is_told_as_one_and_none_that_is_not_shown(stribeck_case):
+    most = NominalEstimate(2.4, 2.3, 2.4, 'N', 2.0, True, at_bound=True)
+    hidden = NominalEstimate(0.006, 0.0055, 0.0065, 'N m/rad', 0.0045, False, shown=False)
+    parameters = {'bend_x': {'pretension': most, 'joint_stiffness': hidden}}
+    differs = Verdict.PARAMETERS_DIFFER
+    case = with_explanation(
+        stribeck_case, parameters=parameters, effects=(), verdict=differs, plant=PLANT
+    )
+    assert verdict_sentence(case) == 'pretension of bend_x is 2.4 N or more instead of 2 N.'
+    assert 'pretension N 2 at a bound: or more' in text_of(html_page(case))
+
+
+def test_two_cells_that_clip_are_told_apart_and_what_else_differs_is_said(stribeck_case):
+    cells = tuple(named('load_cell_saturation', limit_n=7.0, wire=float(k)) for k in range(2))
+    case = dataclasses.replace(stribeck_case, verdict=Verdict.SENSOR_FAULT, effects=cells)
+    first, second = re.findall(r'bend_x \((.*?)\)', verdict_sentence(case))
+    assert (first, second) == ('the cell of the positive wire', 'the cell of the negative wire')
+    unknown = with_explanation(
+        stribeck_case, verdict=Verdict.UNKNOWN_PHYSICS, effects=cells[:1], unknown=None
+    )
+    assert verdict_sentence(unknown) == (
+        'There is load_cell_saturation on bend_x, and nothing explains what else differs on bend_x.'
+    )
+
+
+def test_a_plant_that_lacks_the_main_thing_is_not_recommended(stribeck_case):
+    ladder = dict(stribeck_case.ladder)
+    ladder['augmented'] = ladder['refitted'] = ladder['nominal']
+    lost = with_explanation(
+        stribeck_case,
+        verdict=Verdict.UNKNOWN_PHYSICS,
+        effects=(),
+        unknown=None,
+        adequate=False,
+        ladder=ladder,
+    )
+    assert next_step(lost).startswith('Do not continue with plant.yaml')
+    assert 'is still off by' in ' '.join(reservations(lost))
+
+
 def test_how_the_fits_ended_is_said_beside_their_numbers(stribeck_case):
     fitting = {
         'bend_x': Fitting(True, 'no step lowers the misfit', 7, ()),
@@ -375,7 +415,7 @@ def test_slips_that_nothing_predicts_are_said(consistent):
     tension = dataclasses.replace(consistent.recording.tension, values=spiky)
     recording = dataclasses.replace(consistent.recording, tension=tension)
     text = text_of(html_page(dataclasses.replace(consistent, recording=recording)))
-    assert 'bend_x: wires stick and slip' in text
+    assert re.search(r'bend_x: wires stick and slip.*their scatter of [\d.]+ N', text)
 
 
 @pytest.mark.parametrize(

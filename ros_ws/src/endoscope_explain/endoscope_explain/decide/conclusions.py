@@ -154,6 +154,8 @@ def numbers_differ(decisions: list[Decision]) -> bool:
 
 def has_changed(name: str, estimate: NominalEstimate) -> bool:
     """Whether a nominal parameter differs from its description by more than chance and matter."""
+    if not estimate.shown:
+        return False
     value, nominal = estimate.value, estimate.nominal
     reach = value - estimate.low if nominal < value else estimate.high - value
     outside = abs(value - nominal) > JOINTLY * reach

@@ -99,10 +99,15 @@ def is_noise(fit: Fit) -> bool:
     return all(z < LIMIT for z in excess(fit).values())
 
 
-def slips(observation: JointObservation) -> bool:
-    """Return whether wires stick and slip in a notable share of a recording."""
+def slipping(observation: JointObservation) -> float:
+    """Scatter (rms) in N of wires that stick and slip, beside their noise; 0 where few do."""
     wires = [c for c in observation.channels if c.quantity == 'tension']
-    return any(float(np.mean(c.noise > 1.3 * np.min(c.noise))) > NOTABLE for c in wires)
+    scatter = [0.0]
+    for noise in (c.noise for c in wires):
+        slips = noise > 1.3 * np.min(noise)
+        if float(np.mean(slips)) > NOTABLE:
+            scatter.append(math.sqrt(np.mean(noise[slips] ** 2) - np.min(noise) ** 2))
+    return max(scatter)
 
 
 def _z(values: np.ndarray, independent: float) -> float:

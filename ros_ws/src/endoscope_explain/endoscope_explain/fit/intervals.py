@@ -197,7 +197,7 @@ def nominal_estimates(
     fit: Fit, described: Array, units: dict[str, str]
 ) -> dict[str, NominalEstimate]:
     """Estimates of the nominal parameters of a fit, beside those described (parameters,)."""
-    found = intervals(fit)
+    found, ends = intervals(fit), fit.at_bounds()
     absent = {place for each in lacking(described) for place in each.places}
     return {
         name: NominalEstimate(
@@ -209,6 +209,7 @@ def nominal_estimates(
             _in_band(name, float(value), float(described[index])),
             bool(shown),
             partner,
+            name in ends,
         )
         for name, index, value, low, high, shown, partner in zip(
             found.names,

@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 SMOOTHED_S = 0.021
 """Window over which the encoder's steps are smoothed: shorter than the servo's answer."""
 BEHIND = ('tension', 'bending')
+OF_THE_MOTOR = {'shaft_position', 'shaft_velocity'}
+"""Its effort is what the wires pull by."""
 
 
 def cut_at_motor(recording: Recording, plant: PlantDescription) -> tuple[ChainCut, ...]:
@@ -122,6 +124,10 @@ def locate_unknown(recording: Recording, explanation: Explanation) -> list[Place
 
 def _shows_in(found: Sequence[SignalExcess]) -> str:
     """Stage of what is wrong with no function known, by the signals that show it."""
+    # What follows a motor that goes elsewhere is off because of it.
+    own = [e for e in found if e.view.joint == found[0].view.joint]
+    if {e.view.quantity for e in own if e.view.signal in shares(own)} & OF_THE_MOTOR:
+        return 'actuator'
     # Off by more than its noise: a tracker has too few samples for a share of the misfit.
     off = {e.view.quantity for e in found if e.total > len(e.excess)}
     behind = off & {'tension', 'bending'}

@@ -9,7 +9,7 @@ from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.places import Argument
 from endoscope_explain.case import EXPERIMENT_FILE, ExplainedCase, Ladder
 from endoscope_explain.explanation import Explanation, Verdict
-from endoscope_explain.fit.evidence import slips
+from endoscope_explain.fit.evidence import slipping
 from endoscope_explain.fit.free_parameters import tolerance
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.observe.predicted_signals import RecordedView, view
@@ -83,7 +83,7 @@ def html_page(case: ExplainedCase) -> str:
         physics_of=sentences.physics_of,
         meaning=sentences.EVIDENCE,
         joint=joint,
-        slipping=[o.joint for o in recorded.observations if slips(o)],
+        slipping={o.joint: slipping(o) for o in recorded.observations if slipping(o)},
         plants=[numbers.PLANTS[name] for name in recorded.of_joint(joint)[0].predicted],
         unknown=unknown,
         formula=unknown is not None and unknown.formula_share >= sentences.LEAST_SHARE,

@@ -75,7 +75,11 @@ def _sentence_of_rest(case: ExplainedCase) -> str:
     if case.effects and not sure:
         return _doubt(case, case.effects[0])
     if sure:
-        named = [_named(e) for e in sure[:MOST_NAMED]]
+        kinds = [(e.id, e.joint) for e in sure]
+        named = [
+            f'{_named(e)} ({", ".join(form(e))})' if kinds.count((e.id, e.joint)) > 1 else _named(e)
+            for e in sure[:MOST_NAMED]
+        ]
         more = len(sure) - len(named)
         named += [f'{more} more'] if more else []
         missing = case.rest is Verdict.MISSING_PHYSICS
@@ -147,10 +151,9 @@ def reservations(case: ExplainedCase) -> list[str]:
     unlike = (f for f in left_over if f.id == 'unlike_the_plant')
     said += [f'{_capital(finding.text)}. {_capital(finding.remedy)}.' for finding in unlike]
     said += [f'{_capital(other)}. It was used as corrected.' for other in case.said_of_others]
-    if not case.effects and case.explanation.unknown is None:
+    if case.rest in (Verdict.CONSISTENT, Verdict.INSUFFICIENT_DATA):
         return said
-    left = judged(case, case.ladder).get('augmented', {})
-    off = {signal: fit.ratio for signal, fit in left.items() if fit.ratio > STAYS}
+    off = _off(case)
     if off:
         signal, ratio = max(off.items(), key=lambda item: item[1])
         more = ''
@@ -161,17 +164,26 @@ def reservations(case: ExplainedCase) -> list[str]:
             'The form differs, or something else is missing too.'
         )
     besides = {key: e for key, e in differing(case).items() if not e.in_band}
-    if besides:
+    if besides and case.rest is not Verdict.PARAMETERS_DIFFER:
         shown_ones = [_one_differing(*key, e) for key, e in besides.items()]
         said.append(f'Besides, {_all(shown_ones)}.')
     return said
+
+
+def _off(case: ExplainedCase) -> dict[str, float]:
+    """Misfit over noise of the signals that stay off with the best plant."""
+    plants = list(judged(case, case.ladder).values())
+    best = plants[-1] if plants else {}
+    return {signal: fit.ratio for signal, fit in best.items() if fit.ratio > STAYS}
 
 
 def what_is_known(e: NominalEstimate) -> str:
     """Say why a fitted number is none that the recording tells; empty where it is."""
     if e.together_with:
         return f'only together with {e.together_with}'
-    return '' if e.shown else 'this recording does not show it'
+    if not e.shown:
+        return 'this recording does not show it'
+    return f'at a bound: {_beyond(e)}' if e.at_bound else ''
 
 
 def not_shown(case: ExplainedCase) -> list[str]:
@@ -228,6 +240,10 @@ def next_step(case: ExplainedCase) -> str:
         return 'Repair or calibrate the sensor, and record again.'
     if case.verdict is Verdict.RECORDING_FAULT and case.audit.faults():
         return 'Repair the recording, or continue: nothing was judged where it is wrong.'
+    if not case.explanation.adequate and not case.effects and case.explanation.unknown is None:
+        return (
+            'Do not continue with plant.yaml: what is missing was not found. Look where it shows.'
+        )
     if not case.validation:
         return 'Judge plant.yaml on a second recording: give one with --validate.'
     return 'Continue with plant.yaml.'
@@ -246,10 +262,14 @@ def _differing(case: ExplainedCase) -> str:
 
 def _one_differing(joint: str, name: str, e: NominalEstimate) -> str:
     name, unit, factor = in_degrees(name, e.unit)
-    return (
-        f'{name} of {joint} is {digits(factor * e.value)} instead of {digits(factor * e.nominal)}'
-        f'{f" {unit}" if unit else ""}'
-    )
+    value, unit = digits(factor * e.value), f' {unit}' if unit else ''
+    value = f'{value}{unit} {_beyond(e)}' if e.at_bound else value
+    return f'{name} of {joint} is {value} instead of {digits(factor * e.nominal)}{unit}'
+
+
+def _beyond(e: NominalEstimate) -> str:
+    """On which side of its bound a number lies."""
+    return 'or more' if e.value > e.nominal else 'or less'
 
 
 def _unknown(case: ExplainedCase) -> str:
@@ -257,6 +277,9 @@ def _unknown(case: ExplainedCase) -> str:
     if term is None or not term.helps:
         shown = [place.joint for place in case.places if place.shares]
         joint = [*shown, *case.recording.joints][0]
+        sure = [_named(e) for e in case.effects if not e.doubtful]
+        if sure:
+            return f'There is {_all(sure)}, and nothing explains what else differs on {joint}.'
         return f'Neither an effect of the catalogue nor a function explains {joint}.'
     what = term.there.physics.rstrip('.')
     states = ''.join(f' and {factor.there.argument.words}' for factor in term.factors)
