@@ -101,3 +101,27 @@ def test_nothing_is_engaged_before_anything_was_heard():
     dead_man = OperatorDeadMan()
     dead_man.turn(0, Conditions('c1', True, source='master', pictures=((0, 0),)))
     assert (dead_man.state, dead_man.reason, dead_man.missing) == (OPEN, None, Reason.SILENT)
+
+
+def test_a_page_that_slept_while_another_operated_is_not_late():
+    page = Page()
+    page.engage()
+    page.learns(holder='c2')
+    page.turn(20)
+    page.learns(holder='c1')
+    page.turn()
+    page.hand = replace(page.hand, pressed=False)
+    for _ in range(5):
+        page.send(late_ns=500 * MS)
+        page.turn(20)
+    assert page.dead_man.state is READY
+
+
+def test_a_page_that_comes_back_counts_its_frames_anew():
+    page = Page()
+    page.engage()
+    page.go_on(200)
+    page.dead_man.closed('c1')
+    page.turn()
+    page.hand = replace(page.hand, seq=0)
+    page.engage()
