@@ -12,11 +12,11 @@ from endoscope_explain.report.writing import report_mapping
 
 
 def rise(revisited, low=-1.0, high=1.0):
-    return Stroke(low, high, 0.0, revisited)
+    return Stroke(low, high, revisited)
 
 
 def fall(revisited, low=-1.0, high=1.0):
-    return Stroke(high, low, 0.0, revisited)
+    return Stroke(high, low, revisited)
 
 
 def test_of_what_was_made_twice_nothing_is_said():

@@ -37,8 +37,8 @@ def stands_beside(tried: JointSearch, angle: Array, left_out: tuple[str, ...], j
 
 def _least(level: Level) -> float:
     """Gain by the screen from which on a term might be found in place of the level's best."""
-    gain = max(level.gain(level.best), 0.0) if level.found else 0.0
-    return NEAR * gain if level.is_found else gain
+    # A fit may double what the screen says of it.
+    return NEAR * max(level.gain(level.best), 0.0) if level.found else 0.0
 
 
 def _gain_beside(level: Level, angle: Array, left_out: tuple[str, ...], jobs: int) -> float:
