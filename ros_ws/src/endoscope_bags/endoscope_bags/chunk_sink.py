@@ -192,6 +192,7 @@ class ChunkSink:
             self._file.close()
 
     def abandon(self) -> None:
+        """Close the file as it is."""
         if self._worker is not None:
             self._worker.shutdown(cancel_futures=True)
         # The file is given up: whatever closing it still complains of is of no use.

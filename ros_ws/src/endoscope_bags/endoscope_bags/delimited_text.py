@@ -76,6 +76,7 @@ class DelimitedText:
                 raise BagError(f'{self.path}: line {line}: {error}') from error
 
     def cells(self, index: int) -> list[str]:
+        """Return the texts of a column."""
         cells = []
         for line, row in self.rows():
             if len(row) <= index:

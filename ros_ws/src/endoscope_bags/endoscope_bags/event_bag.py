@@ -99,6 +99,7 @@ class EventBag:
 
     @property
     def kind(self) -> str:
+        """Of the first event."""
         return self.events[0].kind
 
     @property

@@ -64,6 +64,7 @@ class BagInformation:
 
     @property
     def message_count(self) -> int:
+        """Messages of all topics."""
         return sum(topic.message_count for topic in self.topics)
 
     @property
@@ -72,6 +73,7 @@ class BagInformation:
         return sum(topic.lost or 0 for topic in self.topics)
 
     def as_json(self) -> dict[str, Any]:
+        """Return it as plain data."""
         return {
             **vars(self),
             'message_count': self.message_count,

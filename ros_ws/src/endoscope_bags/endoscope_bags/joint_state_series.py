@@ -199,6 +199,7 @@ def decode_joint_states(
 def decode_poses(
     topic: str, payloads: Payloads, log_ns: IntArray, publish_ns: IntArray, sequence: IntArray
 ) -> PoseSeries:
+    """Decode all poses of a topic."""
     n = len(payloads)
     stamp_ns = np.zeros(n, dtype=np.int64)
     decoded = {'position': np.full((n, 3), np.nan), 'orientation': np.full((n, 4), np.nan)}

@@ -33,6 +33,7 @@ class BagEntry:
     trouble: str  # why it cannot be read, that it was cut off, or `BEING_RECORDED`; else empty
 
     def as_json(self) -> dict[str, Any]:
+        """Return it as plain data."""
         return {**vars(self), 'events': [vars(event) for event in self.events]}
 
     def lines(self) -> list[str]:
@@ -116,6 +117,7 @@ def _read_whole(path: Path) -> tuple[McapSummary, str]:
 
 
 def listing(folder: Path, entries: Sequence[BagEntry]) -> str:
+    """Return the entries as text."""
     if not entries:
         return printable(f'{folder}: no recording')
     return '\n'.join(printable(line) for entry in entries for line in entry.lines())

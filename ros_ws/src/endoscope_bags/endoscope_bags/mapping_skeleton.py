@@ -56,6 +56,7 @@ class TableDescription:
     columns: tuple[TableColumn, ...]
 
     def as_json(self) -> dict[str, Any]:
+        """Return it as plain data."""
         return {**vars(self), 'columns': [vars(column) for column in self.columns]}
 
     def __str__(self) -> str:

@@ -148,6 +148,7 @@ class McapFile:
         return schema
 
     def add_channel(self, channel: Channel) -> None:
+        """Write a channel."""
         self._write(_encoded(channel))
         self._channels.append(channel)
 
@@ -162,6 +163,7 @@ class McapFile:
             self._counts[channel] = self._counts.get(channel, 0) + count
 
     def add_metadata(self, name: str, content: dict[str, str]) -> None:
+        """Write a metadata record."""
         data = _encoded(Metadata(name=name, metadata=content))
         self._metadata.append(MetadataIndex(offset=self.position, length=len(data), name=name))
         self._write(data)

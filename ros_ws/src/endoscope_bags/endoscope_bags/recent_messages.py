@@ -16,6 +16,7 @@ _SECOND = 1_000_000_000
 
 
 def packed(batch: Sequence[Arrival]) -> bytes:
+    """Put arrivals into one piece of bytes."""
     pack = _HEAD.pack
     return b''.join(
         [

@@ -39,10 +39,12 @@ class SessionReport:
 
     @property
     def message_count(self) -> int:
+        """Messages recorded."""
         return sum(self.counts.values())
 
     @property
     def lost_count(self) -> int:
+        """Messages lost."""
         return sum(self.lost.values())
 
     @property
@@ -90,6 +92,7 @@ class RecordingSession:
 
     @property
     def path(self) -> Path:
+        """The recording."""
         return self._writer.path
 
     def add_topic(

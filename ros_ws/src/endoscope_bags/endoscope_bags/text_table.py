@@ -110,6 +110,7 @@ def _stream(
     values: Mapping[str, Array],
     fresh: Mask,
 ) -> MessageStream:
+    """Messages of a topic in some of the rows."""
     stamps = time[block][fresh[block]]
     numbers = {quantity: array[block][fresh[block]] for quantity, array in values.items()}
     return MessageStream(

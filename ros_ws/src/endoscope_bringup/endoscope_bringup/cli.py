@@ -52,6 +52,7 @@ class _Program(OneLineParser):
 
 
 def build_parser() -> OneLineParser:
+    """Return the parser of `endoscope` with all subcommands."""
     parser = _Program(
         prog='endoscope',
         description='Compensation of hysteresis in a flexible endoscope, on ROS 2 Jazzy.',

@@ -30,12 +30,14 @@ class ProgressLine:
         self._clock = threading.Thread(target=self._redraw, daemon=True)
 
     def __enter__(self) -> Self:
+        """Start the clock."""
         if self._shows:
             self._draw()
             self._clock.start()
         return self
 
     def __exit__(self, *_: object) -> None:
+        """Take the bar away."""
         self._ended.set()
         if self._shows:
             self._clock.join()

@@ -108,6 +108,7 @@ class Gate:
         self._counts = counts
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer as ASGI asks."""
         refusal = self._admission.refusal(scope)
         if refusal is None and scope['type'] == 'websocket':
             await self._app(scope, receive, send)

@@ -69,6 +69,7 @@ class Background:
             self._process.stdin.write(f'{line}\n'.encode())
 
     async def close(self) -> None:
+        """End what is under way."""
         if self._task is None or self._task.done():
             return
         if self._process is not None and self._process.returncode is None:

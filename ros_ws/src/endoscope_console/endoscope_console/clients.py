@@ -134,13 +134,16 @@ class Clients:
         return client
 
     def leave(self, client: Client) -> None:
+        """Forget one that is gone."""
         del self._open[client.id]
         self.counts['pictures dropped'] += client.outbox.dropped
 
     def of(self, kind: Kind) -> list[Client]:
+        """Those of one kind, oldest first."""
         return [client for client in self._open.values() if client.kind == kind]
 
     def by_id(self, name: str) -> Client | None:
+        """The one of that name."""
         return self._open.get(name)
 
     @property

@@ -16,6 +16,7 @@ ends the page and, where this command started it, the graph.
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `console`."""
     parser = subparsers.add_parser(
         'console',
         help='operate by a page in the browser, with a graph started unless one runs',

@@ -203,6 +203,7 @@ class Explanations:
             one.ended(said[0] if said else '')
 
     async def cancel(self, name: str) -> str:
+        """End one that is under way."""
         one = self._all.get(name)
         if one is None or not one.running:
             raise EndoscopeError(f'no explanation {name} is under way')

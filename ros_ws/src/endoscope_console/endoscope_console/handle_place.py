@@ -73,10 +73,12 @@ class HandlePlace:
         return Settings(**self.read_master('source', 'scale'))
 
     def read_master(self, *names: str) -> dict[str, Any]:
+        """Values of the master's parameters."""
         client = self._graph.client
         return {n: read_parameter(client, f'{MASTER_NODE}.{n}', PATIENCE_S).value for n in names}
 
     def set_master(self, **values: Any) -> None:
+        """Set parameters of the master."""
         set_parameters(self._graph.client, MASTER_NODE, values, PATIENCE_S)
 
     async def give_back(self) -> None:

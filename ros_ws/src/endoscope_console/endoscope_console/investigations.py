@@ -215,6 +215,7 @@ class Investigations:
             one.question.answer.set_result(go)
 
     def answer(self, question: str, go: bool) -> str:
+        """Answer what the operator is asked."""
         for one in self._all.values():
             if one.question is not None and one.question.id == question:
                 self._answer(one, go)

@@ -174,6 +174,7 @@ class Operations:
         return await self.controls.playing.begin(self.controls.holder, still, file)
 
     async def _adopt(self, plant: str | None) -> str:
+        """Put a plant into force, or the one before; what became of it."""
         self.controls.require_rest()
         text = '' if plant is None else plant_text(self.explanations.plant_file(plant))
         adopt = partial(self._graph.plants.adopt, text, PATIENCE_S)
@@ -202,6 +203,7 @@ class Operations:
         await self.controls.playing.motion(motion, ask, begins)
 
     def _halt(self) -> None:
+        """End what an investigation moves."""
         self.controls.count_halt('a person ended it')
         if self._graph.client.state == 'ENABLED':
             self._graph.client.order('pause')

@@ -156,10 +156,12 @@ _hello = msgspec.json.Decoder(Hello)
 
 
 def read_order(text: str) -> Order:
+    """Read an order."""
     return _read(_orders, text)
 
 
 def read_hello(text: str) -> Hello:
+    """Read the first words of a client."""
     return _read(_hello, text)
 
 

@@ -104,6 +104,7 @@ class Stream:
         return self.last.position
 
     def close(self) -> None:
+        """Leave the topic."""
         self._subscription.close()
 
 
@@ -174,5 +175,6 @@ class Pictures:
         return sum(stream.malformed for stream in self._streams)
 
     def close(self) -> None:
+        """Leave all topics."""
         for stream in self._streams:
             stream.close()

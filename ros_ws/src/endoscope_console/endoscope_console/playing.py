@@ -75,6 +75,7 @@ class Playing:
 
     @property
     def is_experiment(self) -> bool:
+        """Whether that is an experiment."""
         return self._played is not None
 
     def is_over(self) -> bool:

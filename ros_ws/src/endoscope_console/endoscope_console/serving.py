@@ -65,6 +65,7 @@ class _Server(uvicorn.Server):
     """Leaves signals to whoever serves."""
 
     def capture_signals(self) -> Any:
+        """Capture none."""
         return nullcontext()
 
 

@@ -88,6 +88,7 @@ class ViewedTopic:
         self.channel.log(data, log_time=info['received_timestamp'])
 
     def close(self) -> None:
+        """Hear the topic no more."""
         if self._subscription is not None:
             self._subscription.close()
             self._subscription, self._last = None, None

@@ -61,9 +61,11 @@ class SimulatedSlave:
         )
 
     def trouble(self) -> str:
+        """A simulation has nothing to complain about."""
         return ''
 
     def health(self) -> dict[str, object]:
+        """Nothing to report."""
         return {}
 
     def close(self) -> None:

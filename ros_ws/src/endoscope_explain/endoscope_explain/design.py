@@ -104,6 +104,7 @@ def left_over(truth: Recording, rival: PlantDescription, joint: str) -> Array:
 
 
 def imagine(plant: PlantDescription, waveform: Waveform, rig: Rig) -> Recording:
+    """A plant's noise-free answer to the motion of one joint."""
     joints = plant.joint_names()
     desired = np.zeros((len(waveform.time), len(joints)))
     desired[:, joints.index(waveform.joint)] = waveform.angle

@@ -45,9 +45,11 @@ class Reported:
 
     @property
     def sentence(self) -> str:
+        """The verdict's sentence."""
         return self.told.partition('\n')[0]
 
     def content(self) -> dict[str, Any]:
+        """Return what report.json says."""
         parsed: dict[str, Any] = json.loads(self.files[REPORT_JSON])
         return parsed
 

@@ -164,14 +164,17 @@ QUANTITY_UNITS = {
 
 
 def axis(joint: str) -> str:
+    """Return the letter of a joint: `x` of `bend_x`."""
     return joint.rpartition('_')[2]
 
 
 def wire_names(joint: str) -> tuple[str, str]:
+    """Return the names of the positive and the negative wire of a joint."""
     return f'wire_{axis(joint)}_pos', f'wire_{axis(joint)}_neg'
 
 
 def motor_name(joint: str) -> str:
+    """Return the name of a joint's motor."""
     return f'motor_{axis(joint)}'
 
 

@@ -63,10 +63,12 @@ def render_page(
 
 
 def head() -> str:
+    """Return the look of a page with plots, as one `<style>` element."""
     return '<style>\n' + '\n'.join(map(_text, _STYLES)) + '\n</style>'
 
 
 def scripts() -> str:
+    """Return the `<script>` elements that stand at the end of a page with plots."""
     return ''.join(f'<script>{_text(name)}</script>\n' for name in _SCRIPTS)
 
 

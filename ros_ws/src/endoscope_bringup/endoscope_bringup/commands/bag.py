@@ -7,6 +7,7 @@ from endoscope_bringup.subcommands import add_json_option, print_json, within
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `bag` with `list`, `info`, `cut` and `recover`."""
     parser = subparsers.add_parser('bag', help='look into a recording, cut it, save a damaged one')
     actions = parser.add_subparsers(dest='action', metavar='ACTION', required=True)
     listed = actions.add_parser(

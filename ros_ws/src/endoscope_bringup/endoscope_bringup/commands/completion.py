@@ -12,6 +12,7 @@ zsh:           endoscope completion zsh > _endoscope, in a folder of $fpath
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `completion`."""
     parser = subparsers.add_parser(
         'completion',
         help='print a script by which a shell completes commands and options',
@@ -23,6 +24,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    """Print the script."""
     import shtab
 
     from endoscope_bringup.cli import build_parser

@@ -16,6 +16,7 @@ class _MappingHelp(argparse.Action):
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `convert`."""
     parser = subparsers.add_parser(
         'convert',
         add_help=False,

@@ -9,6 +9,7 @@ from endoscope_bringup.subcommands import seed
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `demo`."""
     parser = subparsers.add_parser(
         'demo',
         help='the whole procedure on the simulated slave, recorded, with a report',

@@ -7,6 +7,7 @@ from endoscope_bringup.subcommands import add_json_option, print_json, within
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `doctor`."""
     parser = subparsers.add_parser(
         'doctor',
         help='find serial ports and servos, and say what to change',

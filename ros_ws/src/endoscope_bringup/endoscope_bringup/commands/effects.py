@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `effects`."""
     parser = subparsers.add_parser(
         'effects',
         help='list the physics that a plant.yaml can add to the nominal plant',

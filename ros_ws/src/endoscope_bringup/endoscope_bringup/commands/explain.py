@@ -15,6 +15,7 @@ STEPS = 6
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `explain`."""
     parser = subparsers.add_parser(
         'explain',
         help='say where a recording and its simulation differ, and what was left out',
@@ -135,6 +136,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _seconds(args: argparse.Namespace) -> list[Path | None]:
+    """The second recording of each bag."""
     given: list[Path | None] = list(args.validate or [None])
     if len(given) == 1:
         return given * len(args.bags)

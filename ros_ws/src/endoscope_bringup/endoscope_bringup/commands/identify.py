@@ -18,6 +18,7 @@ MODELS = (*HYSTERESIS_MODELS, PHYSICAL)
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `identify`."""
     parser = subparsers.add_parser(
         'identify',
         help='fit a hysteresis model to a recording',

@@ -17,6 +17,7 @@ LOOKS_S = 3.0
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `investigate`."""
     parser = subparsers.add_parser(
         'investigate',
         help='move a rig, explain it, and play what tells the rest apart, until it is explained',

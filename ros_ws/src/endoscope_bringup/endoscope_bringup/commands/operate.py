@@ -36,6 +36,7 @@ _INTERRUPTED = (
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `operate`."""
     parser = subparsers.add_parser(
         'operate',
         help='enable, calibrate, set parameters, record: ask a running graph, print its answer',

@@ -5,6 +5,7 @@ import json
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `record`."""
     parser = subparsers.add_parser(
         'record',
         help='record topics into a bag',

@@ -6,6 +6,7 @@ from endoscope_bringup.subcommands import within
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `replay`."""
     parser = subparsers.add_parser(
         'replay',
         help="publish a bag's topics at their pace or faster, with /clock",

@@ -11,6 +11,7 @@ WORTH_SAYING = 0.02
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `simulate`."""
     parser = subparsers.add_parser(
         'simulate',
         help="write the plant's answer to the commands of a bag",

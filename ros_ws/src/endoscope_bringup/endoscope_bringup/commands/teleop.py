@@ -28,6 +28,7 @@ handle is silent.
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `teleop`."""
     parser = subparsers.add_parser(
         'teleop',
         help='move the slave by the keyboard of a terminal; a held key is the dead-man',

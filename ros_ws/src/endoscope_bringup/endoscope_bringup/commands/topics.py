@@ -6,6 +6,7 @@ from endoscope_bringup.subcommands import COUNT, SECONDS, add_graph_options
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
+    """Add `topics`."""
     parser = subparsers.add_parser(
         'topics',
         help="the graph's topics on the wire: who speaks and listens, what is missing",

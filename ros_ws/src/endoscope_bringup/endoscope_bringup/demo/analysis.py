@@ -62,6 +62,7 @@ class Angles:
 
     @classmethod
     def of(cls, recording: Recording) -> 'Angles':
+        """Those of a recording."""
         actual = recording.joint_state(names.SLAVE_MEASURED).select(names.JOINTS)
         asked = recording.joint_state(names.SLAVE_COMMAND).select(names.JOINTS)
         return cls(

@@ -87,6 +87,7 @@ class LiveGraph(ClosedOnExit):
         return self.node.ticker.now_ns() * 1e-9
 
     def advance(self, seconds: float) -> None:
+        """Let time go on."""
         if self._clock is None:
             self._runtime.spin_until(Future(), seconds)
             return
@@ -95,6 +96,7 @@ class LiveGraph(ClosedOnExit):
         done.result()
 
     def set(self, node: str, **values: Any) -> None:
+        """Set parameters of a node."""
         set_parameters(self.client, node, values)
 
     @property
@@ -107,6 +109,7 @@ class LiveGraph(ClosedOnExit):
         return {} if self._recorder is None else dict(self._recorder.stop().lost)
 
     def close(self) -> None:
+        """End all nodes."""
         try:
             self.client.close()
         finally:

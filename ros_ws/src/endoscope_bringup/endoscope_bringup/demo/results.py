@@ -68,6 +68,7 @@ class TrackingRun:
 
     @property
     def largest_deg(self) -> float:
+        """Largest error of any joint."""
         return float(np.abs(self.error_deg).max())
 
     @property
@@ -137,6 +138,7 @@ def table_rows(results: DemoResults) -> list[TableRow]:
 
 
 def of_figure(rows: Sequence[TableRow], figure: str) -> list[TableRow]:
+    """The rows of one figure."""
     return [row for row in rows if row.figure == figure]
 
 

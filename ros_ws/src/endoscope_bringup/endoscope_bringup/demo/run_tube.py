@@ -83,6 +83,7 @@ def run_tube(
 
 
 def _calibrate(graph: LiveGraph, tube: Tube, progress: Progress) -> CalibrationFacts:
+    """Run the calibration and wait for its result."""
     last_stamp = 0.0
 
     def note(data: bytes, received_ns: int) -> None:
@@ -121,6 +122,7 @@ def _calibrate(graph: LiveGraph, tube: Tube, progress: Progress) -> CalibrationF
 def _track(
     graph: LiveGraph, tube: Tube, motion: str, method: Method, progress: Progress
 ) -> Segment:
+    """Track one motion by one method."""
     progress(f'tracking {MOTION_TITLE[motion]}, {method}')
     graph.set('compensator', **COMPENSATOR[method])
     graph.advance(SETTLING_S)

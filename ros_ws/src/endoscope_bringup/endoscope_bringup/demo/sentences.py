@@ -36,6 +36,7 @@ def headline(rows: Sequence[TableRow]) -> str:
 
 
 def what_is_wrong(rows: Sequence[TableRow]) -> str:
+    """How far an uncompensated tip is from where it shall be."""
     rmse = [row.values[Method.NONE] for row in of_figure(rows, RMSE)]
     largest = max(row.values[Method.NONE] for row in of_figure(rows, LARGEST))
     return (
@@ -45,6 +46,7 @@ def what_is_wrong(rows: Sequence[TableRow]) -> str:
 
 
 def what_helps(rows: Sequence[TableRow], method: Method) -> str:
+    """What a method leaves."""
     rmse = [row.values[method] for row in of_figure(rows, RMSE)]
     largest = max(row.values[method] for row in of_figure(rows, LARGEST))
     return (
@@ -99,6 +101,7 @@ def where_signals_were_cut(results: DemoResults, best: Method) -> list[str]:
 
 
 def of_loops(results: DemoResults, tube: str, motion: str, best: Method) -> str:
+    """What a tube's loops show."""
     said = f'{tube.capitalize()}, {MOTION_TITLE[motion]}. A perfect tip stays on the dotted line.'
     if best is Method.NONE:
         return said
@@ -107,6 +110,7 @@ def of_loops(results: DemoResults, tube: str, motion: str, best: Method) -> str:
 
 
 def of_tracking(results: DemoResults, tube: str, motion: str, methods: Sequence[Method]) -> str:
+    """What the runs of one motion show."""
     runs = [results.run(tube, motion, method) for method in methods]
     figures = '; '.join(
         f'{run.method} RMSE {run.rmse_deg:.2f}°, largest {run.largest_deg:.1f}°' for run in runs
@@ -118,6 +122,7 @@ def of_tracking(results: DemoResults, tube: str, motion: str, methods: Sequence[
 
 
 def of_calibration(facts: CalibrationFacts) -> str:
+    """What a calibration shows."""
     return (
         f'{facts.tube.capitalize()}, calibration: the tensions of the four wires put the tube in '
         f'class {facts.class_deg:.0f}° with probability '

@@ -74,6 +74,7 @@ def act(client: GraphClient, args: argparse.Namespace) -> Reply:
 
 
 def _adopt(client: GraphClient, file: str | None, patience_s: float) -> Reply:
+    """Put a plant file into force, or without one the plant before."""
     text = '' if file is None else plant_text(Path(file))
     now = AdoptedPlants(client).adopt(text, patience_s)
     reach = [ranges_in_words(now.ranges, names.JOINTS)] if now.ranges else []

@@ -15,6 +15,7 @@ class MotionsByLines:
         self._asked, self._answers = asked, answers
 
     def say(self, sentence: str) -> None:
+        """Say a sentence of the log."""
         self._write({'say': sentence})
 
     def play(self, motion: Motion, file: Path, bag: Path, plant: Path | None = None) -> None:

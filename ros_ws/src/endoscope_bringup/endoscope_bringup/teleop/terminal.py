@@ -121,6 +121,7 @@ class Terminal(ClosedOnExit):
                 os.write(self._out, f'{text}\n'.encode())
 
     def close(self) -> None:
+        """Put the terminal back as it was found."""
         if self._before is None:
             return
         before, self._before = self._before, None

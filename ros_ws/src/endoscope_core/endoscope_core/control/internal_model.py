@@ -117,6 +117,7 @@ class TurningPoints:
         self.values = list(values)
 
     def follow(self, value: float) -> None:
+        """Go on to a value."""
         v = self.values
         if len(v) > 1 and (v[-1] - v[-2]) * (value - v[-1]) >= 0.0:
             v[-1] = value
@@ -311,6 +312,7 @@ class InternalModel:
 
     @property
     def angle(self) -> float:
+        """Tip's angle, rad."""
         return float(self._state[TIP])
 
     @property
@@ -324,6 +326,7 @@ class InternalModel:
 
     @property
     def shaft(self) -> float:
+        """Shaft angle, rad."""
         return float(self._state[MOTOR])
 
     @property

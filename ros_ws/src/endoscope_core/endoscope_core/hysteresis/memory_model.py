@@ -37,6 +37,7 @@ class NamedNumbers:
     """The model's name in messages."""
 
     def to_dict(self) -> dict[str, float]:
+        """The parameters by name."""
         return asdict(self)
 
     @classmethod

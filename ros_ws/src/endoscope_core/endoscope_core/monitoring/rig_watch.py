@@ -118,6 +118,7 @@ class _Joint:
         return way >= STILL_RAD and visited >= LEAST_RANGE_RAD and self._way > SWEEPS * visited
 
     def add(self, begin: float, block: Block) -> None:
+        """Judge a block."""
         if self.alarm is not None and self.alarm.parts:
             return
         self.moved += 1

@@ -22,11 +22,13 @@ class Samples:
         self.values = np.empty((0, self.columns))
 
     def append(self, time: ArrayLike, values: ArrayLike) -> None:
+        """Add samples at times (N,) in s with values (N, columns)."""
         self.time = np.concatenate([self.time, np.asarray(time, dtype=float)])
         new = np.asarray(values, dtype=float).reshape(-1, self.columns)
         self.values = np.concatenate([self.values, new])
 
     def clear(self) -> None:
+        """Leave out all."""
         self.time, self.values = self.time[:0], self.values[:0]
 
     def drop(self, before: float) -> None:

@@ -90,6 +90,7 @@ class TubeFamily:
             raise InputError(f'tube bent by {math.degrees(bend):.0f} deg: {error}') from error
 
     def save(self, path: str | Path) -> None:
+        """Write the family as YAML."""
         content = {
             'schema': 1,
             'provenance': dict(self.provenance),

@@ -108,6 +108,7 @@ def _functions(hook: Hook, rows: list[Row]) -> str:
 
 
 def _imports(place: Place) -> list[str]:
+    """Lines that import the functions of a place."""
     functions = [f for f in (place.at, place.sign, place.by_step) if f and not isinstance(f, str)]
     return [f'from {f.__module__} import {f.__name__}' for f in functions]
 

@@ -194,6 +194,7 @@ def save_plant(plant: PlantDescription, path: str | Path) -> None:
 
 
 def plant_as_text(plant: PlantDescription) -> str:
+    """All of a plant as YAML, as `save_plant` writes it."""
     return yaml.safe_dump(plant_to_mapping(plant), sort_keys=False)
 
 

@@ -34,6 +34,7 @@ TABLE_ROWS = 7
 
 
 def wire_states(cells: int) -> int:
+    """Number of states of a wire of `cells` cells."""
     return NODES + cells + 1
 
 

@@ -26,9 +26,11 @@ class DynamixelMotors:
         return Kind.EMULATED if emulated else Kind.REAL
 
     def open(self) -> None:
+        """Open the port and set the servos up; see :meth:`BusThread.start`."""
         self.bus.start()
 
     def set_torque(self, on: bool) -> None:
+        """Arm the bus and switch torque on, or switch it off."""
         self.bus.set_torque(on)
 
     def reboot(self) -> None:
@@ -36,6 +38,7 @@ class DynamixelMotors:
         self.bus.reboot()
 
     def exchange(self, goal: Sequence[float], periods: int) -> MotorReading | None:
+        """Renew the goal, and give the newest reading unless it was given before."""
         self.bus.set_goal(goal)
         newest = self.bus.newest
         if newest is None or newest is self._given:
@@ -45,9 +48,11 @@ class DynamixelMotors:
         return dataclasses.replace(newest.reading, age=age)
 
     def trouble(self) -> str:
+        """Trouble of the bus or of a servo."""
         return self.bus.trouble()
 
     def health(self) -> dict[str, object]:
+        """What diagnostics shall show of the bus."""
         bus = self.bus
         figures = bus.figures
         values: dict[str, object] = {

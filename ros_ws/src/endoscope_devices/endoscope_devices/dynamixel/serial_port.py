@@ -62,6 +62,7 @@ class BusPort(PortHandler):
             raise DeviceError(f'{self.port_name}: servos do not know {self.baudrate} baud: {known}')
 
     def close(self) -> None:
+        """Let go of the port, open or not."""
         if self.ser is not None:
             self.closePort()
 

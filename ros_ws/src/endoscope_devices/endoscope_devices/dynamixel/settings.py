@@ -23,9 +23,11 @@ class ServoMount:
     zero: float = math.pi  # servo angle in rad at which the shaft is at 0
 
     def shaft(self, servo: float) -> float:
+        """Shaft angle of a servo angle, in rad."""
         return self.direction * (servo - self.zero)
 
     def servo(self, shaft: float) -> float:
+        """Servo angle of a shaft angle, in rad."""
         return self.zero + self.direction * shaft
 
 

@@ -97,6 +97,7 @@ class RtuFraming(Framing):
         self._framer = FramerRTU(self._decoder)
 
     def request(self, address: int, count: int) -> bytes:
+        """See :class:`Framing`."""
         return self._framer.buildFrame(self._pdu(address, count))
 
     def length(self, head: bytes) -> int:
@@ -134,6 +135,7 @@ class TcpFraming(Framing):
         return 6 + int.from_bytes(head[4:6], 'big')
 
     def accept(self, reply: bytes) -> tuple[int, ...] | None:
+        """See :class:`Framing`."""
         if len(reply) < _MBAP + 2 or len(reply) != self.length(reply) or reply[2:4] != b'\0\0':
             raise ReplyError(ReplyTrouble.MALFORMED, f'header {reply[:_MBAP].hex(" ")}')
         _, unit, transaction, pdu = self._framer.decode(reply)

@@ -34,6 +34,7 @@ class Line[Opened: serial.Serial | socket.socket](ABC):
         """Connect; LineLostError, which says what to look at, where it cannot be opened."""
 
     def write(self, data: bytes) -> None:
+        """Send bytes."""
         try:
             self._send(data)
         except OSError as error:
@@ -54,6 +55,7 @@ class Line[Opened: serial.Serial | socket.socket](ABC):
         return data
 
     def close(self) -> None:
+        """Let go of it."""
         if self._handle is not None:
             self._handle.close()
             self._handle = None
@@ -87,6 +89,7 @@ class SerialLine(Line[serial.Serial]):
         self._heard_s = 0.0
 
     def open(self) -> None:
+        """See :class:`Line`."""
         try:
             self._handle = serial.Serial(
                 self._path,
@@ -129,6 +132,7 @@ class TcpLine(Line[socket.socket]):
         super().__init__(f'{self._address[0]}:{self._address[1]}')
 
     def open(self) -> None:
+        """See :class:`Line`."""
         try:
             self._handle = socket.create_connection(self._address, _CONNECTS_S)
             self._handle.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -97,15 +97,18 @@ class ModbusLoadCells(ReadingThread[WireReading]):
         self._line_lost = True
 
     def note_shafts(self, velocity: Sequence[float]) -> None:
+        """Take the speed of the motor shafts (J,) in rad/s, so that moving wires are not tared."""
         with self._lock:
             self._window.note_shafts(time.monotonic_ns(), velocity)
 
     def tared(self) -> LoadCellCalibration:
+        """The calibration in which the mean tension of the last second is zero, or TareError."""
         with self._lock:
             mean = self._window.mean(time.monotonic_ns())
             return with_zero(self.calibration, zero_after_tare(self.calibration, mean))
 
     def use(self, calibration: LoadCellCalibration) -> None:
+        """Go on with other zeros."""
         with self._lock:
             self.calibration = calibration
             for check, cell in zip(self._checks, calibration.wires.values(), strict=True):
@@ -114,6 +117,7 @@ class ModbusLoadCells(ReadingThread[WireReading]):
 
     @property
     def trouble(self) -> str:
+        """What is wrong; empty if nothing."""
         if self._line_lost:
             return self._link_trouble
         faults = [check.fault for check in self._checks if check.fault]
@@ -125,6 +129,7 @@ class ModbusLoadCells(ReadingThread[WireReading]):
         return ''
 
     def health(self) -> tuple[str, dict[str, object]]:
+        """What is wrong (empty if nothing), and figures for diagnostics."""
         figures = self._age_figure() | {
             'readings': self._counts['readings'],
             'not believed': self._counts['not believed'],

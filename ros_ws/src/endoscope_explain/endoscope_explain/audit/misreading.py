@@ -153,6 +153,7 @@ def as_findings(
 
 
 def column_name(recording: Recording, quantity: str, column: int) -> str:
+    """Return the name of a column of a quantity or of the command."""
     if quantity == 'command':
         joint = recording.joints[column]
         name = joint if recording.command.topic == DESIRED else motor_name(joint)

@@ -57,6 +57,7 @@ class MissingTerm:
 
     @property
     def is_known(self) -> bool:
+        """Whether it is an effect of the catalogue."""
         return self.name in KNOWN
 
 

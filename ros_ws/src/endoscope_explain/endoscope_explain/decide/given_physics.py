@@ -58,6 +58,7 @@ GivenJoints = Mapping[str, GivenPhysics]
 def without_recording(
     terms: tuple[Term, ...], found: Fit, rivalries: Mapping[str, Rivalry] | None = None
 ) -> GivenPhysics:
+    """The physics of a fit."""
     model = found.model
     return GivenPhysics(
         terms,

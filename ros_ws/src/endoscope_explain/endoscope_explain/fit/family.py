@@ -55,6 +55,7 @@ class Family:
 
     @property
     def largest(self) -> float:
+        """Largest absolute value."""
         return self.place.largest_of(self.multiplies)
 
     @property
@@ -72,6 +73,7 @@ class Family:
         return self.within(self.basis @ coefficients)
 
     def within(self, values: Array) -> Array:
+        """Values (NODES,) cut to what the place allows."""
         if self.place.never_negative and not self.multiplies:
             values = np.maximum(values, 0.0)
         return np.clip(values, -self.largest, self.largest)
@@ -96,6 +98,7 @@ class Family:
         return np.asarray(drawn - span @ (span.T @ drawn))
 
     def scaled(self, amplitude: float) -> 'Family':
+        """The same functions, larger by a factor."""
         return replace(self, basis=amplitude * self.basis)
 
 

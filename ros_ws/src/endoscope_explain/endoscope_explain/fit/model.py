@@ -151,6 +151,7 @@ class JointModel:
         return np.concatenate([theta, others])
 
     def residuals(self, theta: Array) -> Array:
+        """Residuals in noise units, all channels in a row."""
         return self.residuals_of(*self.packed(theta))
 
     def residuals_of(self, parameters: Array, lead: float) -> Array:
@@ -174,6 +175,7 @@ class JointModel:
         return self.wide_step if rugged else STEP
 
     def bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest coordinates."""
         return (
             np.array([item.coordinate(item.low) for item in self.free]),
             np.array([item.coordinate(item.high) for item in self.free]),
@@ -189,6 +191,7 @@ class JointModel:
         )
 
     def prior_weight(self) -> Array:
+        """Inverse spreads."""
         return np.array([1.0 / item.spread for item in self.free])
 
     def cost(self, residuals: Array, theta: Array) -> float:

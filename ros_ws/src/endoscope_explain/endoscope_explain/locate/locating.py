@@ -107,6 +107,7 @@ def locate_effects(
 
 
 def _without(plant: PlantDescription, effect: NamedEffect) -> PlantDescription:
+    """The plant without an effect, or without the function by which the plant has it."""
     here = effect.id, effect.joint
     if any((e.id, e.joint) == here for e in plant.effects):
         return replace(plant, effects=tuple(e for e in plant.effects if (e.id, e.joint) != here))

@@ -129,6 +129,7 @@ class JointObservation:
 
     @property
     def size(self) -> int:
+        """Number of analysis samples of all channels."""
         return sum(len(channel.time) for channel in self.channels)
 
     @property
@@ -138,6 +139,7 @@ class JointObservation:
 
     @property
     def duration(self) -> float:
+        """Length in s."""
         return self.inputs.shape[1] * self.tick
 
     def coarser(self, factor: int) -> 'JointObservation':

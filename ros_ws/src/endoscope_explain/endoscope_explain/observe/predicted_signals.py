@@ -31,6 +31,7 @@ class SignalView:
     predicted: Mapping[str, Array]  # (M,) by the plant's name
 
     def residual(self, name: str) -> Array:
+        """Return measured minus predicted in noise units."""
         return np.asarray((self.measured - self.predicted[name]) / self.noise)
 
 
@@ -46,9 +47,11 @@ class RecordedView:
 
     @property
     def joints(self) -> tuple[str, ...]:
+        """Return the names of the joints."""
         return tuple(o.joint for o in self.observations)
 
     def of_joint(self, joint: str) -> tuple[SignalView, ...]:
+        """Return the signals of one joint."""
         return tuple(s for s in self.signals.values() if s.joint == joint)
 
 

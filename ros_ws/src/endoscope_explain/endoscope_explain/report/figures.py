@@ -48,6 +48,7 @@ LEAST_READABLE = 0.1
 
 
 def experiment_figure(experiment: NextExperiment) -> str:
+    """Plot the proposed motion."""
     time = np.array(experiment.time)
     angle = np.degrees(np.array(experiment.command))
     curves = tuple(

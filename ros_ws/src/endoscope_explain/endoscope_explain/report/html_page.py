@@ -109,6 +109,7 @@ def _effects_title(case: ExplainedCase) -> str:
 
 
 def _plants(explanation: Explanation) -> dict[str, Any]:
+    """The plants of an explanation by name, each once."""
     plants = {'nominal': explanation.nominal}
     if explanation.fit:
         plants['refitted'] = explanation.refitted

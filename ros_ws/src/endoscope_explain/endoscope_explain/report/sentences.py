@@ -311,6 +311,7 @@ def _doubt(case: ExplainedCase, effect: NamedEffect) -> str:
 
 
 def _named(effect: NamedEffect) -> str:
+    """An effect, and the name that the recording cannot tell from it."""
     rival = f' or {effect.alternatives[0]}' if effect.alternatives else ''
     return f'{effect.id}{rival} on {effect.joint}'
 

@@ -144,6 +144,7 @@ def pull(
 def _move_wire(
     motor: Array, joint: Array, grip: Array, springs: Array, slip: Array, along: Array
 ) -> bool:
+    """Tension (N, cells + 1) in N along a wire whose ends are displaced (N,) in m to the motor."""
     extension = 0.0
     for i in range(len(springs)):
         extension += along[0, i] / springs[i]

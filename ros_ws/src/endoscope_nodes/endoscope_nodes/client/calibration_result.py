@@ -123,6 +123,7 @@ def _zero_values(zeros: 'NDArray[np.float64] | None') -> dict[str, object]:
 
 
 def numbers_of(result: DiagnosticArray) -> JointState:
+    """Return the figures of a result as numbers in SI, which programs that plot can show."""
     [status] = result.status
     numbers = {'success': float(status.level == OK)}
     for item in status.values:

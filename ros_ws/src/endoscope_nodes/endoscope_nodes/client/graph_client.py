@@ -272,11 +272,13 @@ class GraphClient(GraphListener):
         return self.answer(client.call_async(request), service, patience_s)
 
     def answer(self, future: Future, what: str, patience_s: float = PATIENCE_S) -> Any:
+        """Wait for the answer to a call."""
         if not self.wait_until(future.done, patience_s):
             raise GraphError(f'{what} has not answered for {patience_s:g} s')
         return future.result()
 
     def close(self) -> None:
+        """Listen and ask no more; the node remains."""
         super().close()
         for client in self._clients.values():
             self.node.destroy_client(client)

@@ -101,6 +101,7 @@ class GraphListener(ClosedOnExit):
         return subscription
 
     def hear(self) -> None:
+        """Take all that has come."""
         for subscription, take in self._heard:
             for data, info in subscription.take():
                 take(data, info['received_timestamp'])
@@ -210,6 +211,7 @@ class GraphListener(ClosedOnExit):
             raise GraphError(f'timed out after {patience_s:g} s{self.pace} waiting for {what}')
 
     def close(self) -> None:
+        """Listen no more; the node remains."""
         for subscription, _ in self._heard:
             subscription.close()
 

@@ -44,6 +44,7 @@ class GraphParameter:
     type: int  # one of rcl_interfaces/msg/ParameterType
 
     def parse(self, text: str) -> Any:
+        """Read a value of this parameter's type."""
         kind, wanted = _WANTED[self.type]
         if self.type >= Kind.PARAMETER_BOOL_ARRAY or self.type == Kind.PARAMETER_BYTE_ARRAY:
             listed = text.strip().removeprefix('[').removesuffix(']')
@@ -60,6 +61,7 @@ class GraphParameter:
 
 
 def _one(kind: type, text: str) -> Any:
+    """Read one value; None where it is none."""
     if kind is str:
         return text
     try:
@@ -75,6 +77,7 @@ def _whole(kind: type, value: Any) -> Any:
 
 
 def node_and_parameter(name: str) -> tuple[str, str]:
+    """Split ``NODE.PARAMETER``."""
     node, _, parameter = name.strip('/').partition('.')
     if not node or not parameter:
         raise ParameterError(f'{name!r}: give NODE.PARAMETER, for example compensator.mode')

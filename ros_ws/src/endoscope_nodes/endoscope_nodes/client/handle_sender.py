@@ -22,6 +22,7 @@ def handle_senders(node: Node) -> list[str]:
 
 
 def clutch_message(held: bool, stamp_ns: int) -> Joy:
+    """Say whether the clutch is held."""
     message = Joy(buttons=[int(held)])
     message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
     return message

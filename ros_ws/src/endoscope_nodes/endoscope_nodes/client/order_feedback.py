@@ -49,6 +49,7 @@ class OrderFeedback:
     words: str = ''  # the same for a person
 
     def message(self, stamp_ns: int) -> DiagnosticArray:
+        """Write it, at a time in ns."""
         values = asdict(self)
         failed = self.state in (OrderState.ABORTED, OrderState.REJECTED)
         level = ERROR if failed else OK
@@ -58,6 +59,7 @@ class OrderFeedback:
 
     @classmethod
     def of_message(cls, message: DiagnosticArray) -> 'OrderFeedback':
+        """Read it."""
         [said] = message.status
         texts = {item.key: item.value for item in said.values}
         return cls(

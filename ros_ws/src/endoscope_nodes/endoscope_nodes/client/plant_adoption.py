@@ -43,6 +43,7 @@ class AdoptionRequest:
     session: str  # motion session in which it is asked for
 
     def message(self, stamp_ns: int) -> DiagnosticArray:
+        """Write it, at a time in ns."""
         values = {'id': self.id, 'plant': self.plant}
         message = diagnostic_array(stamp_ns, status(REQUEST, OK, '', values))
         message.header.frame_id = self.session
@@ -50,6 +51,7 @@ class AdoptionRequest:
 
     @classmethod
     def of_message(cls, message: DiagnosticArray) -> 'AdoptionRequest | None':
+        """Read it; None where it is none."""
         for said in message.status:
             values = {item.key: item.value for item in said.values}
             if said.name == REQUEST and set(values) == {'id', 'plant'}:
@@ -75,6 +77,7 @@ class PlantInForce:
     answer: str = ''  # what became of it, in words
 
     def message(self, stamp_ns: int, session: str) -> DiagnosticArray:
+        """Write it, at a time in ns, of a motion session."""
         values: dict[str, object] = {
             'hash': self.hash,
             'before': self.before,
@@ -98,6 +101,7 @@ class PlantInForce:
 
     @classmethod
     def of_message(cls, message: DiagnosticArray) -> 'PlantInForce | None':
+        """Read it; None where it is none."""
         said = {each.name: each for each in message.status}
         if not {IN_FORCE, ADOPTION} <= set(said):
             return None

@@ -386,4 +386,5 @@ class CalibrationNode(EndoscopeNode):
         return OK, str(self._run.step), values
 
     def close(self) -> None:
+        """Let the classifier's thread end."""
         self._beside.close()

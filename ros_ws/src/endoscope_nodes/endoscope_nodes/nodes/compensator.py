@@ -375,6 +375,7 @@ class CompensatorNode(EndoscopeNode):
         return model_in_words(self._settings, self._trouble, plant, self.findings, remedy)
 
     def close(self) -> None:
+        """Let the thread end in which plants are tried."""
         self._adoption.close()
 
     def _report(self) -> Report:

@@ -77,6 +77,7 @@ class EmTrackerNode(EndoscopeNode):
 
     @property
     def announcement(self) -> str:
+        """Name the device."""
         return f'tracker {self._device_name}'
 
     def _connect(self, device: str, p: EmTrackerParameters) -> TrackerDevice:
@@ -182,5 +183,6 @@ class EmTrackerNode(EndoscopeNode):
         return OK, 'tracking', values
 
     def close(self) -> None:
+        """Let go of the tracker."""
         if self._tracker is not None:
             self._tracker.close()

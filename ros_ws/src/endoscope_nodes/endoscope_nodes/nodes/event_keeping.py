@@ -156,6 +156,7 @@ class EventKeeping:
                 self._end(writing)
 
     def close(self) -> None:
+        """Finish the bags that are being written."""
         if self._writing:
             self._collect(self._node.ticker.now_ns())
         for writing in list(self._writing):
@@ -174,6 +175,7 @@ class EventKeeping:
             self._node.get_logger().info(str(report))
 
     def report(self) -> Report:
+        """Say for the diagnostics what is kept and written."""
         values: dict[str, object] = {
             'kept [s]': self.recent.seconds,
             'kept [MB]': self.recent.size / _MEGABYTE,

@@ -21,6 +21,7 @@ _PERIOD_NS = 45_000_000
 
 
 def section_of(instrument: InstrumentFacts) -> Vertebrae:
+    """Return the bending section of the instrument that stands on the table."""
     return Vertebrae(instrument.section_length, instrument.base_frame)
 
 
@@ -32,6 +33,7 @@ class JointTransforms:
         self._encoder = TransformEncoder([(h.parent, h.child) for h in section.hinges])
 
     def encode(self, stamp_ns: int, angles: Sequence[float]) -> bytes:
+        """Encode the transforms at these angles of all joints, in rad."""
         poses = self._section.transforms(angles)
         return self._encoder.encode(stamp_ns, [(p.translation, p.rotation) for p in poses])
 

@@ -61,6 +61,7 @@ class LoadCellsNode(EndoscopeNode):
 
     @property
     def announcement(self) -> str:
+        """Name the device."""
         return f'load cells {self._device_name}'
 
     def _connect(self, device: str, p: LoadCellsParameters) -> LoadCellDevice:
@@ -131,5 +132,6 @@ class LoadCellsNode(EndoscopeNode):
         return OK, 'reading', values
 
     def close(self) -> None:
+        """Let go of the transmitter."""
         if self._cells is not None:
             self._cells.close()

@@ -111,6 +111,7 @@ class MotorDriverNode(EndoscopeNode):
 
     @property
     def announcement(self) -> str:
+        """Name the device."""
         return f'motors {self._device_name}'
 
     def _describe_rig(self, context: NodeContext) -> RigKind:
@@ -237,6 +238,7 @@ class MotorDriverNode(EndoscopeNode):
         return OK, 'holding' if self.motion.holding else 'following commands', values
 
     def close(self) -> None:
+        """Let go of the device."""
         self._device.close()
 
 

@@ -71,6 +71,7 @@ class PlantAdoption:
         node.ticker.every(_LOOK_S, self._look)
 
     def tell(self) -> None:
+        """Say anew what is in force."""
         self._news = True
 
     def end_session(self) -> None:
@@ -79,6 +80,7 @@ class PlantAdoption:
             self.plant = self._before.pop().plant
 
     def close(self) -> None:
+        """Let the thread end in which plants are tried."""
         self._beside.close()
 
     def _on_rivals(self, rivals: str) -> None:

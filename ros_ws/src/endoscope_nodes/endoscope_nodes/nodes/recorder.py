@@ -179,6 +179,7 @@ class RecorderNode(EndoscopeNode):
         return [(source.name, source.count_publishers()) for source in self._sources]
 
     def close(self) -> None:
+        """Finish what is being written."""
         if self._session is not None:
             self.stop()
         self._events.close()

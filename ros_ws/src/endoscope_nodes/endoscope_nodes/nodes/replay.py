@@ -60,6 +60,7 @@ class ReplayNode(EndoscopeNode):
 
     @property
     def announcement(self) -> str:
+        """Name the bag."""
         return f'{self._parameters_.bag}, {self._parameters_.speed:g} times its pace'
 
     def _open(self, bag: str) -> Recording:

@@ -140,6 +140,7 @@ class WatchNode(EndoscopeNode):
 
     @property
     def announcement(self) -> str:
+        """Say that it watches."""
         return f'watching for a rig other than {self._source}' if self._active else ''
 
     def _on_plant(self, message: DiagnosticArray) -> None:

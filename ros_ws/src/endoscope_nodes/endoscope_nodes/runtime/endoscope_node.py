@@ -102,6 +102,7 @@ class EndoscopeNode(EventlessNode):
         return event
 
     def destroy_node(self) -> None:
+        """Leave the graph."""
         # An event keeps its subscription in the graph.
         for event in self._matched:
             event.destroy_when_not_in_use()

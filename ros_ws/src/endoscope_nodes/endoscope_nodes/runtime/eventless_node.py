@@ -23,6 +23,7 @@ class EventlessNode(Node):
     def create_publisher(
         self, msg_type: type, topic: str, qos_profile: Any, **how: Any
     ) -> Publisher:
+        """Offer a topic."""
         return super().create_publisher(
             msg_type, topic, qos_profile, event_callbacks=_NOT_SENT, **how
         )
@@ -30,6 +31,7 @@ class EventlessNode(Node):
     def create_subscription(
         self, msg_type: type, topic: str, callback: Callable[..., Any], qos_profile: Any, **how: Any
     ) -> Subscription:
+        """Subscribe."""
         return super().create_subscription(
             msg_type, topic, callback, qos_profile, event_callbacks=_NOT_TAKEN, **how
         )

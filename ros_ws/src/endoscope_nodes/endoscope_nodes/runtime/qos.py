@@ -6,6 +6,7 @@ from endoscope_nodes import topics
 
 
 def profile(qos: topics.Qos) -> QoSProfile:
+    """Return what rclpy calls it."""
     return QoSProfile(
         depth=qos.depth,
         history=HistoryPolicy.KEEP_LAST,

@@ -34,6 +34,7 @@ _new_capsule = ctypes.PYFUNCTYPE(ctypes.py_object, c_void_p, c_char_p, c_void_p)
 
 
 def message_class(type_name: str) -> type:
+    """Return the class of a message type, for example of ``'std_msgs/msg/String'``."""
     package, _, name = type_name.partition('/msg/')
     try:
         kind: type = getattr(importlib.import_module(f'{package}.msg'), name)

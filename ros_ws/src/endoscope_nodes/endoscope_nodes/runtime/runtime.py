@@ -108,6 +108,7 @@ class Runtime(NodeContext, ClosedOnExit):
         self._closed = False
 
     def add(self, factory: Callable[[NodeContext], N]) -> N:
+        """Build a node and let the executor serve it."""
         node = factory(self)
         self.nodes.append(node)
         self.executor.add_node(node)
@@ -161,6 +162,7 @@ class Runtime(NodeContext, ClosedOnExit):
         )
 
     def check_parameters(self) -> None:
+        """Refuse overrides that no node knows."""
         names = [node.get_name() for node in self.nodes]
         for name in self._overrides:
             if name not in names:

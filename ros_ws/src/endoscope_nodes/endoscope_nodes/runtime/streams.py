@@ -95,6 +95,7 @@ class JointPublisher:
         self.count += 1
 
     def close(self) -> None:
+        """Leave the topic to another sender."""
         self._node.destroy_publisher(self._publisher)
 
 
@@ -228,7 +229,9 @@ class RawSubscription:
         return taken
 
     def count_publishers(self) -> int:
+        """How many publishers are connected."""
         return int(self._handle.get_publisher_count())
 
     def close(self) -> None:
+        """Leave the topic."""
         self._handle.destroy_when_not_in_use()

@@ -39,6 +39,7 @@ MOMENT, FREQUENCY, PHASE, SECOND = EFFECT.places
 def moment(
     p: Array, x: Array, angle: float, step: float, other: float, time: float, tick: float
 ) -> tuple[float, float]:
+    """Moment in N m on the joint at `time`; it does not depend on the step."""
     along = 2.0 * math.pi * p[FREQUENCY] * time + p[PHASE]
     value = math.sin(along)
     if p[SECOND] != 0.0:

@@ -29,4 +29,5 @@ EFFECT = Effect(
 
 @on_samples(EFFECT)
 def skewed(values: Mapping[str, float], column: int) -> RecordingFaults:
+    """The tracker's clock."""
     return RecordingFaults(skew=values['skew'])

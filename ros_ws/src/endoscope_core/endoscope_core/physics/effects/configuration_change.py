@@ -29,5 +29,6 @@ TIME, FACTOR, DURATION, SMOOTH = EFFECT.places
 @hook(EFFECT, EXPONENT)
 @compiled
 def factor(p: Array, x: Array, speed: float, time: float, tick: float) -> float:
+    """Mean factor on the capstan exponent over the tick around `time`."""
     after = share_after(p[TIME], p[DURATION], p[SMOOTH], time, tick)
     return 1.0 + after * (p[FACTOR] - 1.0)

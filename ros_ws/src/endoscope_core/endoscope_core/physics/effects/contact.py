@@ -39,6 +39,7 @@ DEPTH = 0.2
 def moment(
     p: Array, x: Array, angle: float, step: float, other: float, time: float, tick: float
 ) -> tuple[float, float]:
+    """Moment in N m on the joint, and minus its derivative by the step in N m/rad."""
     side = 1.0 if p[ANGLE] > 0.0 else -1.0
     deep = side * (angle - p[ANGLE])
     if deep <= 0.0:

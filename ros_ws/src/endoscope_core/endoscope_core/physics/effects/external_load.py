@@ -39,6 +39,7 @@ MOMENT, TIME, DURATION, SMOOTH, HOLD, PERIOD = EFFECT.places
 def moment(
     p: Array, x: Array, angle: float, step: float, other: float, time: float, tick: float
 ) -> tuple[float, float]:
+    """Mean moment in N m over the tick around `time`; it does not depend on the step."""
     ramp = tick + p[DURATION]
     latest = math.floor((time - p[TIME] + 0.5 * ramp) / p[PERIOD])
     held = 0.0

@@ -21,4 +21,5 @@ EFFECT = Effect(
 @hook(EFFECT, DIRECTION)
 @compiled
 def factors(p: Array, x: Array) -> tuple[float, float]:
+    """Factors on the exponent where a wire slides towards the motor, and towards the joint."""
     return 1.0 + p[ASYMMETRY], 1.0 - p[ASYMMETRY]

@@ -32,6 +32,7 @@ DISTANCE = SLOTS.state_block()
 @hook(EFFECT, EXPONENT)
 @compiled
 def factor(p: Array, x: Array, speed: float, time: float, tick: float) -> float:
+    """Factor on the capstan exponent after the distance slid so far."""
     lengths = x[DISTANCE] / p[LENGTH]
     if p[TAIL] > LEAST_TAIL:
         lengths = math.log1p(p[TAIL] * lengths) / p[TAIL]
@@ -41,4 +42,5 @@ def factor(p: Array, x: Array, speed: float, time: float, tick: float) -> float:
 @hook(EFFECT, ADVANCE)
 @compiled
 def count(p: Array, x: Array, load_a: float, load_b: float, time: float, tick: float) -> None:
+    """Count the distance slid in a tick."""
     x[DISTANCE] += abs(x[SLIDING_SPEED]) * tick

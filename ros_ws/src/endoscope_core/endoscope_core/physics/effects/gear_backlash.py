@@ -29,6 +29,7 @@ FLANKS = SLOTS.state_block(3)
 @hook(EFFECT, PULLEY_ANGLE)
 @compiled
 def behind_play(p: Array, x: Array, shaft: float) -> float:
+    """Pulley's angle in rad once the shaft has moved to `shaft`; keeps the memory."""
     half_gap = 0.5 * p[GAP]
     total = 0.0
     for k in range(3):

@@ -28,4 +28,5 @@ TORQUE, SPEED, VISCOUS = EFFECT.places
 @hook(EFFECT, EFFORT)
 @compiled
 def braked(p: Array, x: Array, effort: float, speed: float) -> float:
+    """Motor's torque in N m as the servo reads it."""
     return effort + p[TORQUE] * math.tanh(speed / p[SPEED]) + p[VISCOUS] * speed

@@ -27,5 +27,6 @@ MOMENT, PHASE = EFFECT.places
 def moment(
     p: Array, x: Array, angle: float, step: float, other: float, time: float, tick: float
 ) -> tuple[float, float]:
+    """Moment in N m on the joint, and minus its derivative by the angle in N m/rad."""
     along = angle + p[PHASE]
     return -p[MOMENT] * math.sin(along), p[MOMENT] * math.cos(along)

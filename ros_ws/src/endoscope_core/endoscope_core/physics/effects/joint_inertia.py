@@ -24,5 +24,6 @@ EFFECT = Effect(
 def moment(
     p: Array, x: Array, angle: float, step: float, other: float, time: float, tick: float
 ) -> tuple[float, float]:
+    """Moment in N m that the change of speed takes, and minus its derivative by the step."""
     by_step = p[INERTIA] / (tick * tick)
     return -by_step * (step - x[JOINT_STEP]), by_step

@@ -38,6 +38,7 @@ ANGLE, STIFFNESS, LOSS = EFFECT.places
 def moment(
     p: Array, x: Array, angle: float, step: float, other: float, time: float, tick: float
 ) -> tuple[float, float]:
+    """Moment in N m on the joint, and minus its derivative by the step in N m/rad."""
     beyond = abs(angle) - p[ANGLE]
     if beyond <= 0.0:
         return 0.0, 0.0

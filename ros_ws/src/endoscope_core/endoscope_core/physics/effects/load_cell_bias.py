@@ -24,4 +24,5 @@ BIAS, WIRE = EFFECT.places
 @hook(EFFECT, LOAD_CELL)
 @compiled
 def biased(p: Array, x: Array, reading: float, cell: int, neighbour: float, time: float) -> float:
+    """Tension in N as the cell reads it."""
     return reading + p[BIAS] if cell == p[WIRE] else reading

@@ -31,6 +31,7 @@ SHARE, WIRE = EFFECT.places
 @hook(EFFECT, LOAD_CELL)
 @compiled
 def mixed(p: Array, x: Array, reading: float, cell: int, neighbour: float, time: float) -> float:
+    """Tension in N as the cell reads it."""
     if p[WIRE] == 2.0 or cell == p[WIRE]:
         return reading + p[SHARE] * neighbour
     return reading

@@ -26,4 +26,5 @@ RATE, WIRE = EFFECT.places
 @hook(EFFECT, LOAD_CELL)
 @compiled
 def drifted(p: Array, x: Array, reading: float, cell: int, neighbour: float, time: float) -> float:
+    """Tension in N as the cell reads it at `time`."""
     return reading + p[RATE] * time if cell == p[WIRE] else reading

@@ -24,4 +24,5 @@ GAIN, WIRE = EFFECT.places
 @hook(EFFECT, LOAD_CELL)
 @compiled
 def scaled(p: Array, x: Array, reading: float, cell: int, neighbour: float, time: float) -> float:
+    """Tension in N as the cell reads it."""
     return p[GAIN] * reading if cell == p[WIRE] else reading

@@ -26,4 +26,5 @@ LIMIT, WIRE = EFFECT.places
 @hook(EFFECT, LOAD_CELL)
 @compiled
 def clipped(p: Array, x: Array, reading: float, cell: int, neighbour: float, time: float) -> float:
+    """Tension in N as the cell reads it."""
     return min(reading, p[LIMIT]) if cell == p[WIRE] else reading

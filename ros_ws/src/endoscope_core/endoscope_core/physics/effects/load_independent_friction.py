@@ -24,4 +24,5 @@ LEAST_EXPONENT = 1e-3
 @hook(EFFECT, FRICTION_FLOOR)
 @compiled
 def floor(p: Array, x: Array) -> float:
+    """Tension in N that would cause this friction."""
     return p[FORCE] / max(p[CAPSTAN_EXPONENT], LEAST_EXPONENT)

@@ -29,6 +29,7 @@ RATE, TIME_CONSTANT, SPAN = EFFECT.places
 @hook(EFFECT, LENGTH)
 @compiled
 def loosened(p: Array, x: Array, wire: int, time: float) -> float:
+    """What has been added to each wire's length by `time`, m."""
     slowness = 1.0 / p[TIME_CONSTANT]
     share = math.expm1(-slowness * time) / math.expm1(-slowness * p[SPAN])
     lost = min(p[PRETENSION], p[RATE] * p[SPAN] * share)

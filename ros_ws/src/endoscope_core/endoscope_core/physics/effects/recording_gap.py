@@ -35,5 +35,6 @@ EFFECT = Effect(
 
 @on_samples(EFFECT)
 def gap(values: Mapping[str, float], column: int) -> RecordingFaults:
+    """The stretch that is missing."""
     topic = TOPICS[round(values['topic'])]
     return RecordingFaults(gaps=(Gap(topic, values['time_s'], values['duration_s']),))

@@ -35,6 +35,7 @@ RISE, SPEED, TAIL = EFFECT.places
 @hook(EFFECT, EXPONENT)
 @compiled
 def factor(p: Array, x: Array, speed: float, time: float, tick: float) -> float:
+    """Factor on the capstan exponent at a sliding speed in m/s."""
     ratio = speed / p[SPEED]
     fall = (1.0 - p[TAIL]) * math.exp(-ratio) + p[TAIL] / (1.0 + ratio * ratio)
     return 1.0 + p[RISE] * fall

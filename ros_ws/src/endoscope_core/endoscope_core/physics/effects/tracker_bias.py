@@ -21,4 +21,5 @@ EFFECT = Effect(
 @hook(EFFECT, TRACKER)
 @compiled
 def offset(p: Array, x: Array, angle: float, history: Array, time: float, tick: float) -> float:
+    """Angle in rad as the tracker reads it."""
     return angle + p[BIAS]

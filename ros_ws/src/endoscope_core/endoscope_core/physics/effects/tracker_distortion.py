@@ -31,6 +31,7 @@ LINEAR, QUADRATIC, CUBIC, WAVE, WAVE_NUMBER, WAVE_PHASE = EFFECT.places
 @hook(EFFECT, TRACKER)
 @compiled
 def distorted(p: Array, x: Array, angle: float, history: Array, time: float, tick: float) -> float:
+    """Angle in rad as the tracker reads it."""
     bent = angle * (p[LINEAR] + angle * (p[QUADRATIC] + angle * p[CUBIC]))
     wave = math.sin(p[WAVE_NUMBER] * angle + p[WAVE_PHASE]) - math.sin(p[WAVE_PHASE])
     return angle + bent + p[WAVE] * wave

@@ -24,4 +24,5 @@ EFFECT = Effect(
 @hook(EFFECT, TRACKER)
 @compiled
 def drifted(p: Array, x: Array, angle: float, history: Array, time: float, tick: float) -> float:
+    """Angle in rad as the tracker reads it at `time`."""
     return angle + p[RATE] * time

@@ -26,4 +26,5 @@ EFFECT = Effect(
 
 @on_samples(EFFECT)
 def wrong(values: Mapping[str, float], column: int) -> RecordingFaults:
+    """The joint's wrong samples."""
     return RecordingFaults(outliers=(Outliers(column, values['rate'], values['size_rad']),))

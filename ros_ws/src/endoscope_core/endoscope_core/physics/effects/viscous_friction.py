@@ -32,6 +32,7 @@ LEAST_EXPONENT = 1e-6
 @hook(EFFECT, EXPONENT)
 @compiled
 def factor(p: Array, x: Array, speed: float, time: float, tick: float) -> float:
+    """Factor on the capstan exponent at a sliding speed in m/s."""
     added = min(LARGEST_EXPONENT, p[LOAD_FACTOR] * speed)
     return 1.0 + added / max(p[CAPSTAN_EXPONENT], LEAST_EXPONENT)
 
@@ -39,4 +40,5 @@ def factor(p: Array, x: Array, speed: float, time: float, tick: float) -> float:
 @hook(EFFECT, FILM_DRAG)
 @compiled
 def film(p: Array, x: Array, speed: float) -> float:
+    """Drag of the whole sheath on a wire per sliding speed, N s/m, at a speed in m/s."""
     return p[COEFFICIENT] / (1.0 + p[THINNING] * speed)

@@ -33,6 +33,7 @@ FAST, SLOW = SLOTS.state_block(2), SLOTS.state_block(2)
 @hook(EFFECT, LENGTH)
 @compiled
 def crept(p: Array, x: Array, wire: int, time: float) -> float:
+    """What a wire has crept, m."""
     return x[FAST + wire] + x[SLOW + wire]
 
 

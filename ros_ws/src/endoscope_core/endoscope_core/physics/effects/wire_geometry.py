@@ -26,4 +26,5 @@ EFFECT = Effect(
 @hook(EFFECT, TRAVEL_OF)
 @compiled
 def taken(p: Array, x: Array, travel: float, wire: int) -> float:
+    """By how much the pulley winds up a wire, m."""
     return travel - p[ASYMMETRY] * travel * travel / p[PULLEY_RADIUS]

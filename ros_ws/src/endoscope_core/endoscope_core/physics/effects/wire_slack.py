@@ -24,4 +24,5 @@ EFFECT = Effect(
 @hook(EFFECT, LENGTH)
 @compiled
 def dead_length(p: Array, x: Array, wire: int, time: float) -> float:
+    """What each wire has too much of, m."""
     return p[DEAD_LENGTH]

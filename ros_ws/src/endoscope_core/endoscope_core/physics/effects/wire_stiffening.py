@@ -30,6 +30,7 @@ TRIES = 20
 @hook(EFFECT, STIFFNESS)
 @compiled
 def factor(p: Array, x: Array, tension: float) -> float:
+    """Factor on a wire's tangent stiffness at a mean tension in N."""
     linear = (tension - x[REST_TENSION]) / p[WIRE_STIFFNESS]
     rate, cubic = 2.0 * p[GROWTH], p[CUBIC]
     if cubic == 0.0:

@@ -125,6 +125,7 @@ class Place(Effect):
 
     @property
     def is_factor(self) -> bool:
+        """Whether the plant takes the exponential of the function as a factor."""
         return self.hook.fold is Fold.FACTORS
 
 
