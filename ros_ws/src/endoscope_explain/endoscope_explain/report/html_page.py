@@ -83,7 +83,7 @@ def html_page(case: ExplainedCase) -> str:
         physics_of=sentences.physics_of,
         meaning=sentences.EVIDENCE,
         joint=joint,
-        slipping={o.joint: slipping(o) for o in recorded.observations if slipping(o)},
+        slipping={o.joint: rms for o in recorded.observations if (rms := slipping(o))},
         plants=[numbers.PLANTS[name] for name in recorded.of_joint(joint)[0].predicted],
         unknown=unknown,
         formula=unknown is not None and unknown.formula_share >= sentences.LEAST_SHARE,

@@ -71,21 +71,26 @@ def _sentence_of_rest(case: ExplainedCase) -> str:
         return _differing(case)
     if case.rest is Verdict.UNKNOWN_PHYSICS:
         return _unknown(case)
-    sure = [e for e in case.effects if not e.doubtful]
-    if case.effects and not sure:
+    named = _not_doubted(case)
+    if case.effects and not named:
         return _doubt(case, case.effects[0])
-    if sure:
-        kinds = [(e.id, e.joint) for e in sure]
-        named = [
-            f'{_named(e)} ({", ".join(form(e))})' if kinds.count((e.id, e.joint)) > 1 else _named(e)
-            for e in sure[:MOST_NAMED]
-        ]
-        more = len(sure) - len(named)
-        named += [f'{more} more'] if more else []
+    if named:
         missing = case.rest is Verdict.MISSING_PHYSICS
         begin = 'The simulation leaves out' if missing else 'The recording shows'
         return f'{begin} {_all(named)}.'
     return f'{_capital(case.audit.apart_from_mistakes().faults()[0].text)}.'
+
+
+def _not_doubted(case: ExplainedCase) -> list[str]:
+    """The first effects that no second recording puts in doubt, and how many more there are."""
+    sure = [e for e in case.effects if not e.doubtful]
+    kinds = [(e.id, e.joint) for e in sure]
+    named = [
+        f'{_named(e)} ({", ".join(form(e))})' if kinds.count((e.id, e.joint)) > 1 else _named(e)
+        for e in sure[:MOST_NAMED]
+    ]
+    more = len(sure) - len(named)
+    return [*named, f'{more} more'] if more else named
 
 
 def physics_of(effect: NamedEffect) -> str:
@@ -277,9 +282,9 @@ def _unknown(case: ExplainedCase) -> str:
     if term is None or not term.helps:
         shown = [place.joint for place in case.places if place.shares]
         joint = [*shown, *case.recording.joints][0]
-        sure = [_named(e) for e in case.effects if not e.doubtful]
-        if sure:
-            return f'There is {_all(sure)}, and nothing explains what else differs on {joint}.'
+        named = _not_doubted(case)
+        if named:
+            return f'There is {_all(named)}, and nothing explains what else differs on {joint}.'
         return f'Neither an effect of the catalogue nor a function explains {joint}.'
     what = term.there.physics.rstrip('.')
     states = ''.join(f' and {factor.there.argument.words}' for factor in term.factors)
