@@ -9,5 +9,10 @@ BEYOND_FORM = 1
 95% of right explanations stay below."""
 INTERVAL_WIDTH = 1.23
 """Factor on intervals that makes them hold 90% of the true numbers."""
-CERTAINTY = (1.16, 2.69, -1.22)
-"""Weights of the features of a name in the logarithm of the odds that it is right."""
+POSTERIOR = (-1.0, 0.5, 0.5, 0.5, 0.0, -3.0, -3.0, 1.0)
+"""Weights of the logarithm of the temperature of evidence: of one, and of the logarithms of the
+largest gain, of what form is worth, and of what is left over what another form leaves. Then of the
+odds of nothing: of one, and of whether something is said to be missing. Then of those of something
+else: of one, and of what is left."""
+LEAST_PROBABILITY = (0.1, 0.1)
+"""Of what a set holds, where noise alone is left and where more is."""

@@ -1,6 +1,7 @@
 """From a cleaned recording and a plant description to named effects."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,10 +63,14 @@ def explain_recording(
     most_effects: int = MOST_EFFECTS,
     given: GivenJoints | None = None,
     left_out: tuple[str, ...] = (),
+    known: Mapping[str, Collection[str]] | None = None,
     jobs: int = 2,
     progress: Progress | None = None,
 ) -> Explanation:
-    """Explain why a recording differs from the simulation of a plant."""
+    """Explain why a recording differs from the simulation of a plant.
+
+    What is `known` of a joint, names from other recordings of the rig, is fitted in any case.
+    """
     tell = progress or (lambda _: None)
     observations = tuple(o for o in with_held_noise(observe(recording, plant)) if o.channels)
     if not _is_enough(observations):
@@ -79,9 +84,10 @@ def explain_recording(
     observations, references = with_references(recording, observations, well, band, jobs)
 
     def explained(pair: ReferenceFits) -> Explained:
+        joint = pair[0].model.observation.joint
         if given is not None:
-            return explained_by(pair, given[pair[0].model.observation.joint], jobs)
-        tried = search([pair], jobs, most_effects, left_out)
+            return explained_by(pair, given[joint], jobs)
+        tried = search([pair], jobs, most_effects, left_out, (known or {}).get(joint, ()))
         return tried, decide(tried, jobs)
 
     def stands(tried: JointSearch, angle: Array) -> bool:
@@ -111,7 +117,11 @@ def explain_recording(
         adequate=all(d.adequate for d in decisions),
         beyond_form=max(d.beyond_form for d in decisions),
         fitting={joint: fitting(d.chosen.fit) for joint, d in of_joint.items()},
-        instead={joint: d.instead for joint, d in of_joint.items() if d.instead},
+        contests={
+            joint: replace(d.open, beyond_form=d.beyond_form)
+            for joint, d in of_joint.items()
+            if d.open is not None
+        },
     )
 
 

@@ -13,6 +13,13 @@ from endoscope_core.physics.effect import Effect
 from endoscope_core.physics.effects import describe
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.places import Place
+from endoscope_explain.prediction_set import (
+    NOTHING,
+    OTHER_NUMBERS,
+    Contest,
+    Posterior,
+    alternatives,
+)
 
 Array = NDArray[np.float64]
 
@@ -68,6 +75,7 @@ class NamedEffect:
     evidence: Mapping[str, float] = field(default_factory=dict)
     # How often names as clear as this one are right, as measured; NaN where that was not.
     probability: float = math.nan
+    contest: Contest | None = None  # names that were tried in its place; None of given physics
     # A second recording is predicted no better with it.
     doubtful: bool = False
 
@@ -80,6 +88,11 @@ class NamedEffect:
     def stage(self) -> str:
         """Part of the chain from command to recording."""
         return str(self.definition.stage)
+
+    @property
+    def left_open(self) -> Posterior:
+        """The set of names that holds the truth with 90 %; empty where no other was tried."""
+        return {} if self.contest is None else self.contest.left_open(self.id)
 
 
 @dataclass(frozen=True)
@@ -140,6 +153,7 @@ class UnknownTerm:
     # other names that the recording does not tell from it, nearest first
     rivals: tuple[str, ...] = ()
     siblings: tuple[str, ...] = ()  # nearest effects of the catalogue, nearest first
+    contest: Contest | None = None  # names that were tried in its place
     # Others at the same point of the chain are multiplied by one plus this function.
     multiplies: bool = False
     lag_s: float | None = None  # time constant of an argument that lags
@@ -188,8 +202,20 @@ class Explanation:
     beyond_form: float = math.nan
     # how the final fits ended, by joint
     fitting: Mapping[str, Fitting] = field(default_factory=dict)
-    # Effects that the recording does not tell from the other numbers of a joint, nearest first.
-    instead: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    # By joint, what was tried where nothing, or nothing more, is said to be missing.
+    contests: Mapping[str, Contest] = field(default_factory=dict)
+
+    def left_open(self, joint: str) -> Posterior:
+        """What may be missing from a joint besides what is named; empty where noise is left."""
+        contest = self.contests.get(joint)
+        if contest is None:
+            return {}
+        numbers = any(OTHER_NUMBERS in names for names in contest.names)
+        return contest.left_open(OTHER_NUMBERS if numbers else NOTHING)
+
+    def instead(self, joint: str) -> tuple[str, ...]:
+        """Names of it, the likeliest first."""
+        return alternatives(self.left_open(joint), OTHER_NUMBERS)
 
     @staticmethod
     def without_fit(verdict: Verdict, plant: PlantDescription) -> 'Explanation':

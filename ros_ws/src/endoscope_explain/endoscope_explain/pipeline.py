@@ -1,8 +1,8 @@
 """From bags to an explained case: read, audit, explain, locate, judge, propose."""
 
 import time
-from collections.abc import Callable, Collection
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
@@ -57,6 +57,8 @@ class Sources:
     band: float = BAND  # relative tolerance of the plant's parameters
     most_effects: int = MOST_EFFECTS  # largest number of effects on a joint that are looked for
     given: GivenJoints | None = None  # the physics of each joint, if it is not to be searched
+    # By joint, names that other recordings of the rig gave or left open.
+    known: Mapping[str, Collection[str]] = field(default_factory=dict)
     namespace: str | None = None  # of the rig's topics, where a bag has several rigs
     rig: Rig | None = None  # what was recorded, where that is not what the bag says
     plant_file: Path | None = None  # where the plant was read from
@@ -143,6 +145,7 @@ def explain_case(
             band=sources.band,
             most_effects=sources.most_effects,
             given=sources.given,
+            known=sources.known,
             jobs=jobs,
             progress=progress,
         )

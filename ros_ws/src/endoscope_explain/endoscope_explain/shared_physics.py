@@ -59,7 +59,7 @@ def shared_effects(
         tried = search(references, jobs, most_effects, tell=tell)
         found = tried.found
         rivalries = {
-            term.term.id: Rivalry(term.name, term.alternatives, term.margin, term.form)
+            term.term.id: Rivalry(term.name, term.contest, term.margin)
             for term in found_together(tried, jobs)
         }
         for physics, own in zip(given, judged_alone(found.fits), strict=True):

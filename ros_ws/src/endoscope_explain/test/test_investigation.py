@@ -66,7 +66,7 @@ class SimulatedRig:
         recording = self._record(self._plant, duration, len(self.played), shaft)
         self.recordings[bag] = dataclasses.replace(recording, name=bag.name, rig=RIG)
 
-    def explain(self, bags):
+    def explain(self, bags, known):
         """Explain the recordings of bags together, as `explain_together` does."""
         inputs = [
             Inputs(
@@ -127,7 +127,7 @@ def told(stribeck_case):
 
 
 def test_no_more_motions_are_asked_for_than_are_wanted(both, stribeck_case):
-    log = investigate(both, no_rig, lambda bags: stribeck_case)
+    log = investigate(both, no_rig, lambda bags, known: stribeck_case)
     assert log.stopped is Stop.USED_UP
     assert log.rounds[0].motion == 'commissioning'
     assert len(log.rounds) == 2
@@ -137,7 +137,7 @@ def test_no_more_motions_are_asked_for_than_are_wanted(both, stribeck_case):
     assert log.rounds[0].proposed_s > 0.0
     # More of them continue it.
     again = investigate(
-        dataclasses.replace(both, experiments=2), no_rig, lambda bags: stribeck_case
+        dataclasses.replace(both, experiments=2), no_rig, lambda bags, known: stribeck_case
     )
     assert len(again.rounds) == 3
     motions = {(each.motion, each.joint) for each in again.rounds}
@@ -150,7 +150,7 @@ def test_a_fault_ends_it_with_what_is_known_and_it_is_continued(both, stribeck_c
             raise RigStoppedError('FAULT: wire_x_pos at 61 N')
         bag.mkdir()
 
-    log = investigate(both, breaks_down, lambda bags: stribeck_case)
+    log = investigate(both, breaks_down, lambda bags, known: stribeck_case)
     assert log.stopped is Stop.FAULT
     assert 'wire_x_pos at 61 N' in log.words
     assert log.rounds[0].answer.names[0].id == 'stribeck_friction'
@@ -159,7 +159,7 @@ def test_a_fault_ends_it_with_what_is_known_and_it_is_continued(both, stribeck_c
     assert load_plant(both.folder / PLANT).effects
     explained = []
 
-    def explain(bags):
+    def explain(bags, known):
         explained.append([bag.name for bag in bags])
         return told if len(bags) > 1 else stribeck_case
 
@@ -188,7 +188,7 @@ def test_what_breaks_off_loses_nothing_and_is_called_what_it_was(
         investigate(
             both,
             interrupted,
-            lambda bags: stribeck_case,
+            lambda bags, known: stribeck_case,
             page=lambda log: page.page(log, both.folder),
         )
     kept = log_of(both.folder)
@@ -209,7 +209,7 @@ def test_numbers_that_an_effect_may_stand_for_are_asked_about(both, told):
     found = {'effects': (), 'verdict': Verdict.PARAMETERS_DIFFER}
     explanation = dataclasses.replace(told.explanation, instead=instead, **found)
     left_open = dataclasses.replace(told, explanation=explanation, **found)
-    log = investigate(both, no_rig, lambda bags: left_open)
+    log = investigate(both, no_rig, lambda bags, known: left_open)
     (name,) = log.last_answer.names
     assert (name.id, name.joint, name.rivals) == ('other numbers', 'bend_x', instead['bend_x'])
     assert log.stopped is not Stop.ONE_CLASS
@@ -222,7 +222,7 @@ def test_a_comparison_that_nobody_wants_leaves_what_is_known(both, told):
         asked.append((motion.words, file.name, plant))
         raise NotPlayedError('the motion was not wanted')
 
-    log = investigate(both, no_rig, lambda bags: told, track=declined)
+    log = investigate(both, no_rig, lambda bags, known: told, track=declined)
     assert log.stopped is Stop.ONE_CLASS
     assert log.untracked == 'the motion was not wanted'
     ((words, file, plant),) = asked
@@ -233,7 +233,7 @@ def test_a_comparison_that_nobody_wants_leaves_what_is_known(both, told):
 
 
 def test_what_is_at_its_end_is_not_begun_again(both, told):
-    assert investigate(both, no_rig, lambda bags: told).stopped is Stop.ONE_CLASS
+    assert investigate(both, no_rig, lambda bags, known: told).stopped is Stop.ONE_CLASS
     with pytest.raises(InputError, match='at its end: One class is left'):
         begun(both.folder, both.plant_file)
 
@@ -242,7 +242,9 @@ def test_a_folder_is_one_programs_until_that_is_gone(both, stribeck_case):
     left = partial(is_left_behind, both.folder / 'bag_1')
     elsewhere = both.folder.parent
     assert not left(elsewhere)
-    log = investigate(dataclasses.replace(both, experiments=0), no_rig, lambda bags: stribeck_case)
+    log = investigate(
+        dataclasses.replace(both, experiments=0), no_rig, lambda bags, known: stribeck_case
+    )
     with held(both.folder):
         with pytest.raises(InputError, match='another program investigates'), held(both.folder):
             pass
@@ -259,7 +261,7 @@ def test_another_plant_or_a_folder_of_something_else_is_refused(both, tmp_path, 
     with pytest.raises(InputError, match='holds no investigation'):
         begun(tmp_path, both.plant_file)
     dropped = dataclasses.replace(both, experiments=0)
-    investigate(dropped, no_rig, lambda bags: stribeck_case)
+    investigate(dropped, no_rig, lambda bags, known: stribeck_case)
     save_plant(ONE, both.plant_file)
     with pytest.raises(InputError, match='another plant'):
         begun(both.folder, both.plant_file)

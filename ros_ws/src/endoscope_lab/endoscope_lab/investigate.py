@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,12 @@ from endoscope_explain.case import ExplainedCase
 from endoscope_explain.design import SAMPLE_S, as_played
 from endoscope_explain.experiment_motions import family
 from endoscope_explain.explanation import Explanation
-from endoscope_explain.investigation.investigation import EXPERIMENTS, Investigation, investigate
+from endoscope_explain.investigation.investigation import (
+    EXPERIMENTS,
+    Investigation,
+    Known,
+    investigate,
+)
 from endoscope_explain.investigation.log import Stop
 from endoscope_explain.investigation.motions import Motion, commissioning
 from endoscope_explain.pipeline import Inputs, Sources, explain_case
@@ -130,8 +136,8 @@ def asked(
 
     rig = SimulatedRig(case, read, min(until, time.time() + 60.0 * rig_minutes))
 
-    def explain(bags: Sequence[Path]) -> ExplainedCase:
-        found = rig.explain(bags)
+    def explain(bags: Sequence[Path], known: Known) -> ExplainedCase:
+        found = rig.explain(bags, known)
         assert rig.last is not None
         if len(bags) == 1:
             keep(COMMISSIONED, rig.last)
@@ -202,10 +208,10 @@ class SimulatedRig:
         self._recordings[bag] = recording
         self._motion_s += motion.duration
 
-    def explain(self, bags: Sequence[Path]) -> ExplainedCase:
+    def explain(self, bags: Sequence[Path], known: Known) -> ExplainedCase:
         """Explain recordings together, as `explain_together` does bags."""
         recordings = [self._recordings[bag] for bag in bags]
-        case, answer = explained(recordings, self._case.described, self._motion_s)
+        case, answer = explained(recordings, self._case.described, self._motion_s, known)
         self._cpu_s += answer.cpu_s
         self.last = replace(answer, cpu_s=self._cpu_s)
         return case
@@ -246,11 +252,14 @@ def _since(readings: Readings, begin: int) -> Readings:
 
 
 def explained(
-    recordings: Sequence[Recording], plant: PlantDescription, motion_s: float
+    recordings: Sequence[Recording],
+    plant: PlantDescription,
+    motion_s: float,
+    known: Known = MappingProxyType({}),
 ) -> tuple[ExplainedCase, _Answer]:
     """Explain recordings of one rig together, on one core."""
     inputs = [
-        Inputs(Sources(Path(one.name), plant, quick=True), audit_recording(one, plant))
+        Inputs(Sources(Path(one.name), plant, quick=True, known=known), audit_recording(one, plant))
         for one in recordings
     ]
     begun, begun_cpu = time.monotonic(), time.process_time()

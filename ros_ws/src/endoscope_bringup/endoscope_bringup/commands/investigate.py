@@ -107,7 +107,7 @@ def run(args: argparse.Namespace) -> int:
         return investigate(
             of,
             player.play,
-            lambda bags: explain_together(bags, of, step),
+            lambda bags, known: explain_together(bags, known, of, step),
             track=player.play,
             page=lambda log: page.page(log, of.folder),
             say=say,

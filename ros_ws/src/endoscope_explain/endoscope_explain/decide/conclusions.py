@@ -13,7 +13,7 @@ from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.effect import Effect, Stage
 from endoscope_core.physics.effects import describe
 from endoscope_core.physics.layout import NOMINAL_KEYS
-from endoscope_explain.decide.decision import Decision, MissingTerm, certainty
+from endoscope_explain.decide.decision import Decision, MissingTerm
 from endoscope_explain.explanation import (
     ChannelFit,
     Fitting,
@@ -33,6 +33,7 @@ from endoscope_explain.fit.intervals import effect_estimates, nominal_estimates
 from endoscope_explain.fit.model import Fit, joint_of
 from endoscope_explain.fit.solver import Ended
 from endoscope_explain.observe.observation import JointObservation
+from endoscope_explain.prediction_set import alternatives
 from endoscope_explain.search.formula import fitted_function, nearest_formula
 from endoscope_explain.search.levels import JointSearch
 from endoscope_explain.search.refit import Candidate
@@ -57,10 +58,9 @@ def named(
     observations: tuple[JointObservation, ...], decisions: list[Decision]
 ) -> tuple[NamedEffect, ...]:
     """Chosen effects of all joints, what explains most first; each id once before any again."""
-    left = max((decision.beyond_form for decision in decisions), default=math.nan)
     ordered = sorted(
         (
-            _named(observation.joint, decision, term, left)
+            _named(observation.joint, decision, term)
             for observation, decision in zip(observations, decisions, strict=True)
             for term in decision.missing
             if term.is_known
@@ -77,12 +77,13 @@ def named(
     return tuple(sorted(once.values(), key=lambda e: e is not first[e.id]))
 
 
-def _named(joint: str, decision: Decision, term: MissingTerm, left: float) -> NamedEffect:
+def _named(joint: str, decision: Decision, term: MissingTerm) -> NamedEffect:
     definition = describe(term.name)
     # Of physics that was given, no other name was tried.
     measured = math.isfinite(term.p_value)
     modelled = term.name in decision.chosen.effects
     fitted = decision.chosen if modelled else term.formula
+    tried = replace(term.contest, beyond_form=decision.beyond_form)
     return NamedEffect(
         term.name,
         joint,
@@ -93,16 +94,17 @@ def _named(joint: str, decision: Decision, term: MissingTerm, left: float) -> Na
             definition.first_parameter,
             {p.name: p.unit for p in definition.parameters},
         ),
-        term.alternatives,
+        alternatives(tried.left_open(term.name), term.name),
         {
             'gain': term.gain,
             'p_value': term.p_value,
             'margin': term.margin,
-            'form': term.form,
+            'form': term.contest.form,
             'explained': decision.explained,
             'as_formula': float(modelled),
         },
-        certainty(term.gain, term.margin, left) if measured else math.nan,
+        tried.probability(term.name) if measured else math.nan,
+        tried if measured else None,
     )
 
 
@@ -246,11 +248,13 @@ def missing_function(decisions: list[Decision]) -> UnknownTerm | None:
         return None
     _, decision, term = max(found, key=lambda each: each[0])
     siblings = (term.name,) if term.is_known else ()
+    tried = replace(term.contest, beyond_form=decision.beyond_form)
     return replace(
         unknown_term(decision.chosen, term.term),
         explained=decision.explained,
-        rivals=term.alternatives,
+        rivals=alternatives(tried.left_open(term.term.id), term.term.id),
         siblings=siblings,
+        contest=tried,
     )
 
 

@@ -1,43 +1,21 @@
 """From what was tried on one joint to what is said about it."""
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.special import expit
+from scipy.stats import chi2
 
 from endoscope_core.physics.effects import CATALOGUE, KNOWN
-from endoscope_explain.criteria import BEYOND_FORM, CERTAINTY
+from endoscope_explain.criteria import BEYOND_FORM
 from endoscope_explain.fit.intervals import may_be_absent, with_form
+from endoscope_explain.prediction_set import OTHER_NUMBERS, Contest
 from endoscope_explain.search.levels import JointSearch, Level
 from endoscope_explain.search.refit import Candidate
 from endoscope_explain.search.term import Term
 
-Array = NDArray[np.float64]
-
-
-def features(gain: float, margin: float, beyond_form: float) -> tuple[float, float, float]:
-    """What the certainty of a name is judged by."""
-    # One; the share `margin / gain` of its evidence that no other name has; and by how much what is
-    # left exceeds what rigs of another form leave, as a logarithm. In the study of forms that
-    # differ, names whose next rival had less than half of their gain were right in 27 cases of 28,
-    # and what was left told right from wrong in 44 of 48.
-    alone = min(max(margin / gain, 0.0), 1.0) if gain > 0.0 else 0.0
-    left = 0.0 if math.isnan(beyond_form) else math.log(max(beyond_form, 1.0))
-    return 1.0, alone, left
-
-
-def probability(named: ArrayLike, weights: Sequence[float]) -> Array:
-    """Probability (m,) that names are right, by their features (m, 3) and the weights of these."""
-    return np.asarray(expit(np.asarray(named, dtype=float) @ np.asarray(weights)))
-
-
-def certainty(gain: float, margin: float, beyond_form: float) -> float:
-    """Probability that a name is right, as it was measured on rigs whose truth is known."""
-    return float(probability([features(gain, margin, beyond_form)], CERTAINTY)[0])
+SAME = 0.95
+"""Chance with which noise alone moves two fits of one law apart by less, so that they are one."""
 
 
 @dataclass(frozen=True)
@@ -47,13 +25,11 @@ class MissingTerm:
     term: Term  # as it is modelled
     # Effect of the catalogue whose physics it is; the place of the function where it is none's.
     name: str
-    # Names of terms that the recording does not tell from it, nearest first.
-    alternatives: tuple[str, ...]
+    contest: Contest  # names that were tried in its place
     gain: float  # logarithm of the evidence that it brings
     margin: float  # by how much more than the best other name
     p_value: float  # chance that a rig in which nothing is missing shows as much
     formula: Candidate | None  # with the formula of `name`, where it was fitted
-    form: float = 0.0  # evidence in nats by which an error of form may mislead between names
 
     @property
     def is_known(self) -> bool:
@@ -68,8 +44,8 @@ class Decision:
     chosen: Candidate  # the joint with what is missing; the nominal plant where nothing is
     missing: tuple[MissingTerm, ...]  # in the order in which they were found
     explained: float  # share of the excess misfit that the terms remove; 1 where there was none
-    # Names of terms that the recording does not tell from other numbers, nearest first.
-    instead: tuple[str, ...] = ()
+    # Names that were tried for what else might be missing; None where only noise is left.
+    open: Contest | None = None
 
     @property
     def beyond_form(self) -> float:
@@ -86,23 +62,26 @@ def decide(search: JointSearch, jobs: int) -> Decision:
     """Choose a candidate, name its terms and their rivals, and judge whether it is adequate."""
     chosen: Candidate = search.nominal
     missing: tuple[MissingTerm, ...] = ()
-    instead: tuple[str, ...] = ()
+    left: Contest | None = None
     for level in search.levels:
+        left = _contest(level, chosen.terms)
         if not level.is_found:
             break
         best = level.best
         if level.adds_nothing(best):
-            chosen, instead = best, _instead(level)
+            chosen = best
             continue
         best = _with_form(best, jobs)
         if any(not t.is_function and may_be_absent(best.fit, t.effect) for t in best.terms):
             break
-        chosen, instead = best, ()
+        chosen, left = best, None
         if not best.terms[-1].multiplies:
             missing = (*missing[: len(best.terms) - 1], _missing(level, best, jobs))
     missing = _named_as_chosen(search, chosen, missing, jobs)
     chosen = _with_form(chosen, jobs)
-    return Decision(chosen, missing, share_explained(search.nominal, chosen), instead)
+    explained = share_explained(search.nominal, chosen)
+    left = left and left.without(term.name for term in missing)
+    return Decision(chosen, missing, explained, left)
 
 
 def found_together(search: JointSearch, jobs: int) -> tuple[MissingTerm, ...]:
@@ -125,13 +104,6 @@ def share_explained(nominal: Candidate, chosen: Candidate) -> float:
     return 1.0 if above <= 0.0 else float(np.clip((before - after) / above, 0.0, 1.0))
 
 
-def _instead(level: Level) -> tuple[str, ...]:
-    """Terms that explain as much as other numbers do."""
-    others = [c for c in level.found if not level.adds_nothing(c)]
-    near = [c for c in others if level.judge.stands_for(c, level.best)]
-    return tuple(dict.fromkeys(_name(level, each) for each in near))
-
-
 def _missing(level: Level, best: Candidate, jobs: int) -> MissingTerm:
     last = best.terms[-1]
     formulas = [c for c in level.at_the_place_of(best) if not c.terms[-1].is_function]
@@ -144,19 +116,14 @@ def _missing(level: Level, best: Candidate, jobs: int) -> MissingTerm:
         for each in level.found
         if each.terms and [t.id for t in each.terms[:-1]] == beside and _name(level, each) != name
     ]
-    rivals = level.rivals()
-    near = [_name(level, each) for each in others if any(each is rival for rival in rivals)]
-    alternatives = tuple(dict.fromkeys(near))
     best_other = max((level.gain(each) for each in others), default=0.0)
     if formula is not None and formula is not best:
         formula = _with_form(formula, jobs)
         if may_be_absent(formula.fit, formula.terms[-1].effect):
             # The function is there; the effect whose formula comes nearest may not be.
             name, formula = last.id, None
-    margin = gain - max(best_other, 0.0)
-    return MissingTerm(
-        last, name, alternatives, gain, margin, level.p_value, formula, level.judge.form_is_worth
-    )
+    tried = _contest(level, best.terms[:-1], (name, best))
+    return MissingTerm(last, name, tried, gain, gain - max(best_other, 0.0), level.p_value, formula)
 
 
 def _name(level: Level, one: Candidate) -> str:
@@ -190,7 +157,56 @@ def _named_as_chosen(
         named.append(_missing(level, own[0], jobs))
     # What is missing besides is no other name of it.
     names = {term.name for term in named}
-    return tuple(
-        replace(term, alternatives=tuple(a for a in term.alternatives if a not in names))
-        for term in named
+    return tuple(replace(term, contest=term.contest.without(names - {term.name})) for term in named)
+
+
+def _contest(
+    level: Level, terms: tuple[Term, ...], first: tuple[str, Candidate] | None = None
+) -> Contest:
+    """What was tried at a level beside some terms.
+
+    `first` is the name that was chosen, with the candidate that has it; None where none was.
+    """
+    beside = [term.id for term in terms]
+    tried: dict[str, Candidate] = {}
+    if first is not None and first[1].terms[-1].is_function and not _has(level, beside, first[0]):
+        # The effect whose function it is, of which no formula was fitted.
+        tried[first[0]] = first[1]
+    for each in level.found:
+        ids = [term.id for term in each.terms]
+        if ids == beside and level.adds_nothing(each):
+            tried.setdefault(OTHER_NUMBERS, each)
+        elif ids[:-1] == beside and not each.terms[-1].multiplies:
+            tried.setdefault(ids[-1], each)
+    entries: list[tuple[list[str], Candidate]] = []
+    for name, each in sorted(tried.items(), key=lambda item: -item[1].evidence):
+        same = next((names for names, other in entries if are_one(each, other, level.parent)), None)
+        if same is None:
+            entries.append(([name], each))
+        else:
+            same.append(name)
+    return Contest(
+        tuple(tuple(names) for names, _ in entries),
+        tuple(level.gain(each) for _, each in entries),
+        level.judge.form_is_worth,
+        level.is_found and first is not None,
     )
+
+
+def _has(level: Level, beside: list[str], name: str) -> bool:
+    return any([term.id for term in each.terms] == [*beside, name] for each in level.found)
+
+
+def are_one(one: Candidate, other: Candidate, parent: Candidate) -> bool:
+    """Whether two fits with one term more than a parent's differ by less than noise shows."""
+    # The difference of two fits to one law is noise along the directions of their own numbers.
+    apart = sum(
+        float(np.sum((a.residuals - b.residuals) ** 2))
+        for a, b in zip(one.fits, other.fits, strict=True)
+    )
+    own = _numbers(one) + _numbers(other) - 2 * _numbers(parent)
+    return apart <= float(chi2.ppf(SAME, max(own, 1)))
+
+
+def _numbers(one: Candidate) -> int:
+    return sum(len(each.theta) for each in one.fits)

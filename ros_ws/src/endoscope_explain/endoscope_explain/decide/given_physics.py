@@ -19,6 +19,7 @@ from endoscope_explain.fit.model import (
     fit,
     without_effect,
 )
+from endoscope_explain.prediction_set import Contest
 from endoscope_explain.search.levels import JointSearch, Level, search
 from endoscope_explain.search.refit import SETTLED, Candidate, candidate
 from endoscope_explain.search.term import Term
@@ -31,10 +32,10 @@ Flags = NDArray[np.bool_]
 class Rivalry:
     """What was tried in a term's place where it was chosen."""
 
-    name: str  # as in `MissingTerm`
-    alternatives: tuple[str, ...]  # names that were not told from it, nearest first
-    margin: float  # by how much more evidence in nats it has than the best other name
-    form: float  # as in `MissingTerm`
+    # As in `MissingTerm`.
+    name: str
+    contest: Contest
+    margin: float
 
 
 @dataclass(frozen=True)
@@ -109,18 +110,18 @@ def _needed(whole: Candidate, given: GivenPhysics, jobs: int) -> tuple[MissingTe
     fits = parallel_map(lambda less: fit(*less), lesser, jobs)
     found = []
     for term, less in zip(whole.terms, fits, strict=True):
-        rivalry = given.rivalries.get(term.id, Rivalry(term.id, (), 0.0, 0.0))
         gain = whole.evidence - log_evidence(less)
+        alone = Rivalry(term.id, Contest(((term.id,),), (gain,), 0.0, found=True), 0.0)
+        rivalry = given.rivalries.get(term.id, alone)
         found.append(
             MissingTerm(
                 term,
                 rivalry.name,
-                rivalry.alternatives,
+                rivalry.contest,
                 gain,
                 rivalry.margin,
                 math.nan,
                 None if term.is_function else whole,
-                rivalry.form,
             )
         )
     return tuple(found)

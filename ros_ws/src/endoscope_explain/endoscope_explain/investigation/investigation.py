@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -37,8 +37,10 @@ EXPERIMENTS = 4
 
 Play = Callable[[Motion, Path, Path], None]
 """Plays a motion, which a file holds, and records it to a bag."""
-Explain = Callable[[Sequence[Path]], ExplainedCase]
-"""Explains recordings of one rig together."""
+Known = Mapping[str, Collection[str]]
+"""By joint, names that were given or left open before."""
+Explain = Callable[[Sequence[Path], Known], ExplainedCase]
+"""Explains recordings of one rig together, with what is known from some of them."""
 Page = Callable[[Log], str]
 
 
@@ -59,11 +61,16 @@ class Investigation:
 
 
 def explain_together(
-    bags: Sequence[Path], investigation: Investigation, progress: Progress | None = None
+    bags: Sequence[Path],
+    known: Known,
+    investigation: Investigation,
+    progress: Progress | None = None,
 ) -> ExplainedCase:
     """Explain bags of one rig as one recording; BagError if one cannot be used."""
     plant, file = investigation.plant, investigation.plant_file
-    inputs = [read_inputs(Sources(bag, plant, quick=True, plant_file=file)) for bag in bags]
+    inputs = [
+        read_inputs(Sources(bag, plant, quick=True, plant_file=file, known=known)) for bag in bags
+    ]
     return explain_case(inputs_joined(inputs), jobs=investigation.jobs, progress=progress)
 
 
@@ -153,7 +160,7 @@ class _Running:
         """Explain all recordings together, and say what to ask next, or why nothing."""
         began = time.monotonic()
         whole = self.log.whole
-        case = explain([self.of.folder / each.bag for each in whole])
+        case = explain([self.of.folder / each.bag for each in whole], self.log.known())
         save_plant(case.plant, self.of.folder / logs.PLANT)
         found = answer_of(case, time.monotonic() - began)
         self.keep(self.log.with_whole(answer=found))
@@ -217,9 +224,7 @@ def answer_of(case: ExplainedCase, seconds: float) -> Answer:
         for name in ('nominal', 'augmented')
     ]
     names = [Name(e.id, e.joint, e.alternatives, _strength(e), is_wide(e)) for e in case.effects]
-    names += [
-        Name(NUMBERS, joint, rivals, '') for joint, rivals in case.explanation.instead.items()
-    ]
+    names += [Name(NUMBERS, joint, rivals, '') for joint, rivals in _beside_numbers(case).items()]
     sentence = verdict_sentence(case)
     places = tuple(where(place) for place in case.places)
     return Answer(str(case.verdict), sentence, tuple(names), worst[0], worst[1], seconds, places)
@@ -230,8 +235,17 @@ def _strength(effect: NamedEffect) -> str:
     return str(shown(first, effect.parameters[first])) if first in effect.parameters else ''
 
 
+def _beside_numbers(case: ExplainedCase) -> dict[str, tuple[str, ...]]:
+    """By joint, effects that may be missing where no more than other numbers is said to be."""
+    return {
+        joint: names
+        for joint in case.explanation.contests
+        if (names := tuple(n for n in case.explanation.instead(joint) if n in KNOWN))
+    }
+
+
 def _asks_more(case: ExplainedCase) -> bool:
-    rivals = [e.alternatives for e in case.effects] + list(case.explanation.instead.values())
+    rivals = [e.alternatives for e in case.effects] + list(_beside_numbers(case).values())
     return any(map(is_wide, case.effects)) or any(a in KNOWN for each in rivals for a in each)
 
 
@@ -248,7 +262,7 @@ def _proposed(
         if found is not None:
             return found
     described = case.explanation.nominal
-    for joint, effects in case.explanation.instead.items():
+    for joint, effects in _beside_numbers(case).items():
         found = propose_beside_numbers(
             recording, plant, described, joint, effects, jobs, played, left
         )

@@ -120,6 +120,14 @@ class Log:
         answers = [each.answer for each in self.rounds if each.answer is not None]
         return answers[-1] if answers else None
 
+    def known(self) -> dict[str, set[str]]:
+        """By joint, all names that were given or left open so far."""
+        found: dict[str, set[str]] = {}
+        for each in self.rounds:
+            for name in each.answer.names if each.answer is not None else ():
+                found.setdefault(name.joint, set()).update((name.id, *name.rivals))
+        return found
+
     def with_last(self, **changed: object) -> 'Log':
         """The log with its last round changed."""
         return replace(

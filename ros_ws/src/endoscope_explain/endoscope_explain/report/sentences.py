@@ -260,7 +260,7 @@ def _differing(case: ExplainedCase) -> str:
         return 'Parameters differ within their tolerance.'
     (joint, name), e = next(iter(changed.items()))
     more = f', and {len(changed) - 1} more differ' if len(changed) > 1 else ''
-    others = [name for name in case.explanation.instead.get(joint, ()) if name in CATALOGUE]
+    others = [name for name in case.explanation.instead(joint) if name in CATALOGUE]
     rival = f'; {others[0]} would explain as much' if others else ''
     return f'{_one_differing(joint, name, e)}{more}{rival}.'
 

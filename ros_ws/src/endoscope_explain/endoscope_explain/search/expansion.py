@@ -1,7 +1,7 @@
 """Candidates with one term more: screened, tried by few simulations, fitted until they stand."""
 
 import math
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 
@@ -63,14 +63,17 @@ class Screened:
     parent: Parent
     behind: tuple[Background, ...]
     ways: tuple[tuple[Directions, ...], ...]
+    known: Collection[str] = ()  # terms that were named, or left open, by other recordings
 
 
-def screen_terms(parent: Parent, jobs: int, left_out: tuple[str, ...]) -> Screened:
+def screen_terms(
+    parent: Parent, jobs: int, left_out: tuple[str, ...], known: Collection[str] = ()
+) -> Screened:
     """What each term moves that the parent's own numbers cannot take away."""
     behind = tuple(background(found) for found in parent.candidate.fits)
     terms = _terms(behind, left_out)
     ways = tuple(directions(b, own, jobs) for b, own in zip(behind, terms, strict=True))
-    return Screened(parent, behind, _of_one_size(ways))
+    return Screened(parent, behind, _of_one_size(ways), known)
 
 
 def _terms(behind: Sequence[Background], left_out: tuple[str, ...]) -> list[tuple[Term, ...]]:
@@ -160,27 +163,37 @@ def addable(behind: Background, left_out: tuple[str, ...]) -> tuple[Term, ...]:
     return (*effects(behind.fit, left_out), *functions(behind.fit, left))
 
 
-def expanded(screen: Screened, jobs: int) -> list[Candidate]:
-    """The parent with one term more, the best first."""
+Trial = tuple[TrialFit | None, ...]
+"""A term's first fit to each recording; None where that has no use for it."""
+
+
+def expanded(screen: Screened, jobs: int) -> tuple[list[Candidate], list[Trial]]:
+    """The parent with one term more, the best first, and trials that were not worth a full fit."""
     parent = screen.parent.candidate
-    chosen = _worth_a_fit(_trials(screen, jobs))
+    trials = _trials(screen, jobs)
+    chosen = _worth_a_fit(trials, screen.known)
     grown = parallel_map(lambda seen: refit(seen, parent), chosen, jobs)
     grown.sort(key=lambda c: -c.evidence)
     if grown and not grown[0].is_noise and len(parent.fits) == 1:
         grown = _with_finer_functions(grown, screen, jobs)
         grown = _with_their_formulas(grown, screen, jobs)
-    return _settled(grown, jobs)
+    tried = {id(each) for each in chosen}
+    return _settled(grown, jobs), [seen for _, seen in trials if id(seen) not in tried]
 
 
-Trial = tuple[TrialFit | None, ...]
-"""A term's first fit to each recording; None where that has no use for it."""
+def of_each_stage(parent: Candidate, trials: list[Trial], jobs: int) -> list[Candidate]:
+    """The best trials, first ones first, of each part of the chain, fitted until they stand."""
+    formulas = [seen for seen in trials if not term_of(seen).is_function]
+    chosen = first_of_each(formulas, lambda seen: term_of(seen).effect.stage)
+    return parallel_map(lambda seen: converged(refit(seen, parent)), chosen, jobs)
 
 
 def _trials(screen: Screened, jobs: int) -> list[tuple[float, Trial]]:
-    """First fits of the likely terms, with the sum of the logarithms of their costs."""
+    """First fits of the likely terms, with the sum of the logarithms of their costs, best first."""
     references = screen.parent.references
     likely = [
-        _likely(*each, jobs) for each in zip(screen.behind, screen.ways, references, strict=True)
+        _likely(*each, screen.known, jobs)
+        for each in zip(screen.behind, screen.ways, references, strict=True)
     ]
     if len(likely) > 1:
         # What one recording makes likely is tried in all of them.
@@ -209,7 +222,7 @@ def _trials(screen: Screened, jobs: int) -> list[tuple[float, Trial]]:
         costs = [c if seen is None else seen.cost for seen, c in zip(used, without, strict=True)]
         if any(seen is not None for seen in used):
             trials.append((sum(map(math.log, costs)), used))
-    return trials
+    return sorted(trials, key=lambda each: each[0])
 
 
 def _with_those_of(
@@ -222,10 +235,16 @@ def _with_those_of(
 
 
 def _likely(
-    behind: Background, ways: tuple[Directions, ...], references: tuple[Fit, ...], jobs: int
+    behind: Background,
+    ways: tuple[Directions, ...],
+    references: tuple[Fit, ...],
+    known: Collection[str],
+    jobs: int,
 ) -> list[Term]:
     """Terms of one recording that are worth a first fit."""
     likely = _best_screened(screened(behind, ways))
+    there = {term.variant for term in likely}
+    likely += [w.term for w in ways if w.term.id in known and w.term.variant not in there]
     for described in references[1:]:
         # What is missing has bent the fitted numbers, but not the described ones.
         unbent = background(described)
@@ -299,6 +318,11 @@ def _best_screened(ranked: list[Term]) -> list[Term]:
         for term in terms
         if not term.is_function and any(term.shares_place(each) for each in functions)
     ]
+    # Functions of states crowd out what acts elsewhere: each part of the chain has its best formula
+    # tried.
+    formulas = [own for own in variants if not own[0].is_function]
+    of_stages = first_of_each(formulas, lambda own: own[0].effect.stage)
+    chosen += [t for own in of_stages for t in own[:STARTS] if t not in chosen]
     chosen += [t for own in variants for t in own if t.is_nominal and t not in chosen]
     return chosen
 
@@ -311,12 +335,14 @@ def first_of_each[T](ranked: Iterable[T], kind: Callable[[T], Hashable]) -> list
     return list(first.values())
 
 
-def _worth_a_fit(trials: list[tuple[float, Trial]]) -> list[Trial]:
-    """The best after a first fit, what is nominal, and all that are at the place of the best."""
-    ranked = [seen for _, seen in sorted(trials, key=lambda each: each[0])]
+def _worth_a_fit(trials: list[tuple[float, Trial]], known: Collection[str]) -> list[Trial]:
+    """The best after a first fit, what is nominal or known, and all at the place of the best."""
+    ranked = [seen for _, seen in trials]
     chosen = ranked[:REFITTED]
     return chosen + [
         seen
         for seen in ranked[REFITTED:]
-        if term_of(seen).is_nominal or term_of(seen).shares_place(term_of(chosen[0]))
+        if term_of(seen).is_nominal
+        or term_of(seen).id in known
+        or term_of(seen).shares_place(term_of(chosen[0]))
     ]

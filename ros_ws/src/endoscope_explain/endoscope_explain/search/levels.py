@@ -9,7 +9,7 @@ parameters change. Explained one by one, two of them may well be given different
 misfit: they are searched as one, by the sum of the evidence, and fitted together.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
 
@@ -22,6 +22,7 @@ from endoscope_explain.search.expansion import (
     Screened,
     expanded,
     first_of_each,
+    of_each_stage,
     screen_terms,
 )
 from endoscope_explain.search.judging import (
@@ -151,12 +152,14 @@ def search(
     jobs: int,
     depth: int = MOST_EFFECTS,
     left_out: tuple[str, ...] = (),
+    known: Collection[str] = (),
     tell: Callable[[str], None] = lambda _: None,
 ) -> JointSearch:
     """Search what is missing from a joint: `depth` terms at most beside nominal physics.
 
     Of each recording there is the nominal plant refitted, and as described if given. In several of
-    a rig only effects are searched: a function has the range of one motion.
+    a rig only effects are searched: a function has the range of one motion. What is `known`, by
+    name, from other recordings is fitted in any case.
     """
     nominal = candidate((), *(references[0] for references in recordings))
     joint = nominal.fits[0].model.observation.joint
@@ -169,7 +172,7 @@ def search(
     levels: list[Level] = []
     while len(parents[0].candidate.terms) < depth and not parents[0].candidate.is_noise:
         changed = any(each.adds_nothing(each.best) for each in levels)
-        level = _level(parents, jobs, left_out, other_numbers=not changed)
+        level = _level(parents, jobs, left_out, known, other_numbers=not changed)
         levels.append(level)
         tell(f'{joint}: {_told(level)}')
         if not level.is_found:
@@ -219,18 +222,35 @@ def _from_afar(one: Candidate) -> Candidate:
 
 
 def _level(
-    parents: Sequence[Parent], jobs: int, left_out: tuple[str, ...], *, other_numbers: bool
+    parents: Sequence[Parent],
+    jobs: int,
+    left_out: tuple[str, ...],
+    known: Collection[str],
+    *,
+    other_numbers: bool,
 ) -> Level:
     first = parents[0].candidate
-    screens = [screen_terms(parent, jobs, left_out) for parent in parents]
-    found = [each for screen in screens for each in expanded(screen, jobs)]
+    screens = [screen_terms(parent, jobs, left_out, known) for parent in parents]
+    grown = [expanded(screen, jobs) for screen in screens]
+    found = [each for own, _ in grown for each in own]
     found += [
         converged(candidate(parent.candidate.terms, *map(with_any_numbers, parent.candidate.fits)))
         for parent in parents
         if other_numbers and any(map(is_at_tolerance, parent.candidate.fits))
     ]
-    found.sort(key=lambda c: -c.evidence)
-    ranked = tuple(first_of_each(found, lambda c: frozenset(term.variant for term in c.terms)))
+    level = _judged(first, found, screens[0], jobs)
+    if level.is_found or (level.found and level.found[0].is_noise):
+        return level
+    # Before anything is given up, the best of each part of the chain gets a full fit.
+    more = of_each_stage(first, grown[0][1], jobs)
+    if all(each.evidence < level.found[0].evidence for each in more):
+        return replace(level, found=_ranked([*level.found, *more]))
+    return _judged(first, [*found, *more], screens[0], jobs)
+
+
+def _judged(first: Candidate, found: list[Candidate], screen: Screened, jobs: int) -> Level:
+    """Candidates beside rigs in which nothing is missing, or beside recordings left out."""
+    ranked = _ranked(found)
     if not ranked:
         return Level(first, ())
     if len(first.fits) >= LEAST_RECORDINGS:
@@ -241,9 +261,15 @@ def _level(
         ranked = (by_fine_derivatives(ranked[0]), *ranked[1:])
     foretelling, others = _foretelling(first, ranked)
     level = Level(first, foretelling, not_foretelling=others)
-    judge = _beside_nothing_missing(level, screens[0], jobs)
+    judge = _beside_nothing_missing(level, screen, jobs)
     best = replace(level, judge=judge).best
     return replace(level, judge=replace(judge, predicts=_foretells(best, first)))
+
+
+def _ranked(found: list[Candidate]) -> tuple[Candidate, ...]:
+    """Candidates by their evidence, the best first, each combination of terms once."""
+    best_first = sorted(found, key=lambda c: -c.evidence)
+    return tuple(first_of_each(best_first, lambda c: frozenset(t.variant for t in c.terms)))
 
 
 def _foretelling(

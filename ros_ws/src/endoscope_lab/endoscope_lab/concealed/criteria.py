@@ -12,8 +12,9 @@ from scipy.optimize import minimize
 
 from endoscope_core.atomic_output import write_text
 from endoscope_core.errors import EndoscopeError
-from endoscope_explain.decide.decision import features, probability
+from endoscope_explain.criteria import POSTERIOR
 from endoscope_lab.concealed.row import Row
+from endoscope_lab.concealed.sets import JudgedContest
 
 
 def derive(rows: Sequence[Row], write: Path | None) -> None:
@@ -49,6 +50,9 @@ ADEQUATE = 0.95
 PARTS = 10
 WIDE = 10.0
 """Standard deviation of a weight before anything is known: odds of e to the power of ten."""
+LEAST = 1e-6
+"""Probability below which being wrong costs no more: one case must not decide alone."""
+STEPS = {'maxiter': 4000, 'xatol': 1e-3, 'fatol': 1e-4}
 
 
 @dataclass(frozen=True)
@@ -57,7 +61,8 @@ class Criteria:
 
     BEYOND_FORM: float
     INTERVAL_WIDTH: float
-    CERTAINTY: tuple[float, float, float]
+    POSTERIOR: tuple[float, ...]
+    LEAST_PROBABILITY: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -67,65 +72,94 @@ class Bank:
     beyond: Array  # (k,), what is left over what another form leaves
     exact: NDArray[np.bool_]  # (k,), whether all was said rightly
     errors: Array  # (l,), of numbers, over what intervals of an `INTERVAL_WIDTH` of one allow
-    named: Array  # (m, 3), features of each name that was given; see `certainty.features`
-    right: NDArray[np.bool_]  # (m,), whether it is right
-    case: NDArray[np.int64]  # (m,), number of its case
+    contests: tuple[JudgedContest, ...]
+    case: NDArray[np.int64]  # (m,), number of each contest's case
 
 
 def bank_of(rows: Sequence[Row]) -> Bank:
     left = [row for row in rows if math.isfinite(row.beyond_form)]
     errors = np.array([e for row in rows if row.exact for e in row.errors])
-    named = [(n, row, each) for n, row in enumerate(rows) for each in row.evidence]
+    found = [(n, JudgedContest.of_row(each)) for n, row in enumerate(rows) for each in row.contests]
     return Bank(
         np.array([row.beyond_form for row in left]),
         np.array([row.exact for row in left], dtype=bool),
         errors[np.isfinite(errors)],
-        np.array(
-            [features(each['gain'], each['margin'], row.beyond_form) for _, row, each in named]
-        ).reshape(-1, 3),
-        np.array([each['right'] > 0.0 for *_, each in named], dtype=bool),
-        np.array([n for n, *_ in named], dtype=np.int64),
+        tuple(contest for _, contest in found),
+        np.array([n for n, _ in found], dtype=np.int64),
     )
 
 
 def derived(bank: Bank) -> Criteria:
     """Criteria from a bank of cases; ValueError if it has too few for the quantiles."""
+    # The limit is of names that other cases' weights make as likely: of its own ones it would be
+    # too high.
+    given = _crossed(bank)
+    least = [
+        -conformal(-np.array([p for c, p in given if (c.contest.beyond_form > 0.0) == left]), HOLDS)
+        for left in (False, True)
+    ]
     return Criteria(
         # What no more than another form leaves is adequate, whatever right explanations leave.
         max(conformal(bank.beyond[bank.exact], ADEQUATE), 1.0),
         conformal(bank.errors, HOLDS),
-        _logistic(bank.named, bank.right),
+        _likeliest(bank.contests),
+        (max(least[0], 0.0), max(least[1], 0.0)),
     )
 
 
-def _logistic(named: Array, right: NDArray[np.bool_]) -> tuple[float, float, float]:
-    """Weights (3,) of the features that are most likely, with a wide prior that bounds them."""
+def _crossed(bank: Bank) -> list[tuple[JudgedContest, float]]:
+    """Contests, and how likely what is right of each is by the cases of the other parts."""
+    # What is said is in every set.
+    found = []
+    for part in range(PARTS):
+        own = bank.case % PARTS == part
+        weights = _likeliest([c for c, mine in zip(bank.contests, own, strict=True) if not mine])
+        for contest, mine in zip(bank.contests, own, strict=True):
+            if mine:
+                chances = contest.contest.probabilities(weights)[np.array(contest.right)]
+                right = 1.0 if contest.said_is_right else float(np.max(chances, initial=0.0))
+                found.append((contest, right))
+    return found
+
+
+def _likeliest(contests: Sequence[JudgedContest]) -> tuple[float, ...]:
+    """Weights under which what is right is most likely, with a wide prior that bounds them."""
 
     def cost(weights: Array) -> float:
-        sign = np.where(right, 1.0, -1.0)
-        likely = np.sum(np.logaddexp(0.0, -sign * (named @ weights)))
-        return float(likely + 0.5 * np.sum((weights / WIDE) ** 2))
+        chances = [
+            float(np.sum(each.contest.probabilities(weights.tolist())[np.array(each.right)]))
+            for each in contests
+        ]
+        likely = float(np.sum(np.log(np.maximum(chances, LEAST))))
+        return 0.5 * float(np.sum((weights / WIDE) ** 2)) - likely
 
-    a, b, c = minimize(cost, np.zeros(3), method='BFGS').x.tolist()
-    return a, b, c
+    found = minimize(cost, np.array(POSTERIOR), method='Nelder-Mead', options=STEPS)
+    return tuple(found.x.tolist())
 
 
 def reliability(bank: Bank) -> str:
     """How often names are right that were given with some probability, a line for each tenth."""
     # The probability of a name follows from the other cases, ten parts of them in turn.
-    given = np.empty(len(bank.right))
+    given, right = [], []
     for part in range(PARTS):
         own = bank.case % PARTS == part
-        given[own] = probability(bank.named[own], _logistic(bank.named[~own], bank.right[~own]))
+        weights = _likeliest([c for c, mine in zip(bank.contests, own, strict=True) if not mine])
+        for each, mine in zip(bank.contests, own, strict=True):
+            if mine and each.contest.found:
+                of_names = each.contest.probabilities(weights)
+                which = [k for k, names in enumerate(each.contest.names) if each.said in names]
+                given.append(float(of_names[which[0]]))
+                right.append(each.said_is_right)
+    chances, is_right = np.array(given), np.array(right, dtype=bool)
     lines = [f'{"probability":>14s}{"names":>7s}{"mean":>8s}{"right":>8s}']
     for tenth in range(10):
-        inside = np.minimum((10.0 * given).astype(int), 9) == tenth
+        inside = np.minimum((10.0 * chances).astype(int), 9) == tenth
         if np.any(inside):
-            mean, right = np.mean(given[inside]), np.mean(bank.right[inside])
             ends = f'{tenth / 10:.1f} to {(tenth + 1) / 10:.1f}'
-            lines.append(f'{ends:>14s}{np.sum(inside):7d}{mean:8.2f}{right:8.2f}')
-    off = np.mean((given - bank.right) ** 2)
-    flat = np.mean((np.mean(bank.right) - bank.right) ** 2)
+            mean, share = np.mean(chances[inside]), np.mean(is_right[inside])
+            lines.append(f'{ends:>14s}{np.sum(inside):7d}{mean:8.2f}{share:8.2f}')
+    off = np.mean((chances - is_right) ** 2)
+    flat = np.mean((np.mean(is_right) - is_right) ** 2)
     lines.append(f'Brier score {off:.3f}, of one probability for all {flat:.3f}')
     return '\n'.join(lines)
 
@@ -180,6 +214,11 @@ BEYOND_FORM = {criteria.BEYOND_FORM:.3g}
 {ADEQUATE:.0%} of right explanations stay below."""
 INTERVAL_WIDTH = {criteria.INTERVAL_WIDTH:.3g}
 """Factor on intervals that makes them hold {HOLDS:.0%} of the true numbers."""
-CERTAINTY = ({', '.join(f'{weight:.3g}' for weight in criteria.CERTAINTY)})
-"""Weights of the features of a name in the logarithm of the odds that it is right."""
+POSTERIOR = ({', '.join(f'{weight:.3g}' for weight in criteria.POSTERIOR)})
+"""Weights of the logarithm of the temperature of evidence: of one, and of the logarithms of the
+largest gain, of what form is worth, and of what is left over what another form leaves. Then of the
+odds of nothing: of one, and of whether something is said to be missing. Then of those of something
+else: of one, and of what is left."""
+LEAST_PROBABILITY = ({', '.join(f'{least:.3g}' for least in criteria.LEAST_PROBABILITY)})
+"""Of what a set holds, where noise alone is left and where more is."""
 '''

@@ -146,14 +146,6 @@ def is_of(name: str, joint: str, law: Law) -> bool:
     return _names(Statement(name, joint, ''), law)
 
 
-def is_instead(said: Explanation, laws: Sequence[Law]) -> bool:
-    """Whether all laws are said to be what the recording does not tell from other numbers."""
-    return bool(laws) and all(
-        any(is_of(name, joint, law) for joint, names in said.instead.items() for name in names)
-        for law in laws
-    )
-
-
 def _names(said: Statement, law: Law) -> bool:
     if law.joint not in ('', said.joint):
         return False

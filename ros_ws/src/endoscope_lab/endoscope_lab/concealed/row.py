@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import isclose
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -46,8 +47,7 @@ class Row(Judgement):
     # Error of each number over what its interval would allow on that side with an `INTERVAL_WIDTH`
     # of one.
     errors: tuple[float, ...] = ()
-    # Evidence of each named effect, with how many rivals it has, and whether it is right.
-    evidence: tuple[dict[str, float], ...] = ()
+    contests: tuple[dict[str, Any], ...] = ()  # as in `sets.JudgedContest`
     # The laws that are told from other numbers, and whether the first statements name these.
     told: tuple[str, ...] = ()
     first_of_told: bool = True

@@ -6,26 +6,26 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from endoscope_core.physics import PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.criteria import INTERVAL_WIDTH
 from endoscope_explain.explain_recording import explain_recording
-from endoscope_explain.explanation import Estimate, Explanation, NamedEffect
+from endoscope_explain.explanation import Estimate, Explanation
 from endoscope_lab.bench import keep_row, require_known, side_by_side
 from endoscope_lab.concealed import criteria
 from endoscope_lab.concealed.judge import (
     Case,
     Judgement,
     Law,
-    is_instead,
-    is_of,
     judged,
     statements,
 )
 from endoscope_lab.concealed.readings import misfit
 from endoscope_lab.concealed.row import Row, differences, rows_of, table
+from endoscope_lab.concealed.sets import judged_contests
 from endoscope_lab.concealed.strata import STRATA, drawn_case
 from endoscope_lab.concealed.strength import left
 
@@ -79,10 +79,13 @@ def judged_row(case: Case, said: Explanation, seconds: float) -> Row:
     """Judge what is said of a case after some seconds."""
     names = statements(said)
     errors = [_error(*number) for number in _numbers(case, said)]
-    judgement = judged(case.laws, names, case.also)
-    in_set = judgement.in_set or is_instead(said, case.laws)
-    judgement = replace(judgement, in_set=in_set)
     told = told_from_numbers(case)
+    contests = judged_contests(case, said, told)
+    judgement = replace(
+        judged(case.laws, names, case.also),
+        in_set=all(each.holds for each in contests),
+        set_size=float(np.mean([each.size for each in contests])) if contests else 1.0,
+    )
     others = frozenset().union(*(law.ids for law in case.laws if law not in told))
     nominal, refitted, augmented = (
         misfit(plant, case.second, case.described.sensors)
@@ -105,7 +108,7 @@ def judged_row(case: Case, said: Explanation, seconds: float) -> Row:
         seconds=seconds,
         beyond_form=said.beyond_form,
         errors=tuple(INTERVAL_WIDTH * error for error in errors),
-        evidence=tuple(_evidence(effect, case) for effect in said.effects),
+        contests=tuple(each.kept() for each in contests),
         told=tuple(map(_named, told)),
         first_of_told=judged(told, names, case.also | others).first,
         **vars(judgement),
@@ -142,12 +145,6 @@ def _left(case: Case) -> float:
     if case.laws and case.true == case.bare:
         return math.nan
     return left(case.bare, case.true, case.recording.command.values) if case.laws else 0.0
-
-
-def _evidence(effect: NamedEffect, case: Case) -> dict[str, float]:
-    right = any(is_of(effect.id, effect.joint, law) for law in case.laws)
-    rivals = float(len(effect.alternatives))
-    return {**effect.evidence, 'rivals': rivals, 'right': float(right)}
 
 
 def _error(true: float, found: Estimate) -> float:

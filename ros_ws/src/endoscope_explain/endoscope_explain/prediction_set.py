@@ -1,0 +1,86 @@
+"""The names that an answer leaves open, and how likely each of them is.
+
+By evidence alone, one name of many has nearly all of the probability: a thousand samples agree on
+it, and a law of slightly another form moves it by hundreds of nats all the same. So evidence is
+read at a temperature, as is right where no model is (Grunwald, van Ommen, Bayesian Analysis 12,
+2017), and beside the names stand two more hypotheses: that nothing is missing, and that it is
+something that was not tried. What the temperature is in a recording like this one, how likely these
+two are, and from which probability on a name must be said so that the set holds the truth as often
+as it says (Sadinle, Lei, Wasserman, J. Am. Stat. Assoc. 114, 2019) was measured on rigs whose truth
+is known.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import softmax
+
+from endoscope_explain.criteria import LEAST_PROBABILITY, POSTERIOR
+
+Array = NDArray[np.float64]
+
+NOTHING, SOMETHING_ELSE, OTHER_NUMBERS = 'nothing', 'something else', 'other numbers'
+_COLDEST, _HOTTEST = 1e-2, 1e6
+
+Posterior = dict[tuple[str, ...], float]
+"""Names, each with those that are one with it, and their probability, the likeliest first."""
+
+
+@dataclass(frozen=True)
+class Contest:
+    """Names that were tried for one thing that may be missing from a joint."""
+
+    # Each with those that the recording shows to be the same statement, the largest gain first.
+    names: tuple[tuple[str, ...], ...]
+    gains: tuple[float, ...]  # logarithm of the evidence over that without any, in nats
+    form: float  # evidence in nats by which an error of form may mislead between names
+    found: bool  # whether something is said to be missing
+    beyond_form: float = 1.0  # what the chosen plant leaves over what another form leaves
+
+    def without(self, others: Iterable[str]) -> 'Contest':
+        """The same without names that are found besides."""
+        gone = set(others)
+        left = [
+            (kept, gain)
+            for own, gain in zip(self.names, self.gains, strict=True)
+            if (kept := tuple(name for name in own if name not in gone))
+        ]
+        names, gains = tuple(n for n, _ in left), tuple(g for _, g in left)
+        return replace(self, names=names, gains=gains)
+
+    def probabilities(self, weights: Sequence[float] = POSTERIOR) -> Array:
+        """Probability (k + 2,) of each of the names, of nothing, and of something else."""
+        w, gains = np.array(weights), np.array(self.gains)
+        top = float(np.max(gains, initial=0.0))
+        left = math.log(max(self.beyond_form, 1.0))
+        of = np.array([1.0, math.log1p(top), math.log1p(max(self.form, 0.0)), left])
+        low, high = math.log(_COLDEST), math.log(_HOTTEST)
+        temperature = math.exp(float(np.clip(of @ w[:4], low, high)))
+        nothing = -top / temperature + w[4] + w[5] * self.found
+        odds = [*((gains - top) / temperature), nothing, w[6] + w[7] * left]
+        return np.asarray(softmax(odds))
+
+    def posterior(self) -> Posterior:
+        """All that was tried, and nothing, and something else, with their probabilities."""
+        every = [*self.names, (NOTHING,), (SOMETHING_ELSE,)]
+        chances = self.probabilities().tolist()
+        return dict(sorted(zip(every, chances, strict=True), key=lambda each: -each[1]))
+
+    def left_open(self, said: str) -> Posterior:
+        """The part of it that holds the truth with 90 %, what is said of it in any case."""
+        least = LEAST_PROBABILITY[self.beyond_form > 0.0]
+        every = self.posterior().items()
+        return {names: p for names, p in every if p >= least or said in names}
+
+    def probability(self, said: str) -> float:
+        """Probability of what is said."""
+        return next((p for names, p in self.posterior().items() if said in names), math.nan)
+
+
+def alternatives(left: Posterior, said: str) -> tuple[str, ...]:
+    """Names of a set beside the one that is said, the likeliest first."""
+    names = [name for each in left for name in each]
+    return tuple(n for n in names if n not in (said, NOTHING, SOMETHING_ELSE))

@@ -1,0 +1,119 @@
+"""How far the names that an explanation leaves open hold the truth, and how many they are."""
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import asdict, dataclass
+
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_explain.explanation import Explanation
+from endoscope_explain.prediction_set import NOTHING, OTHER_NUMBERS, SOMETHING_ELSE, Contest
+from endoscope_lab.concealed.judge import Case, Law, is_of
+
+
+@dataclass(frozen=True)
+class JudgedContest:
+    """Names that were tried in one place of a rig whose truth is known."""
+
+    contest: Contest
+    joint: str
+    said: str  # the name that was given; nothing, or other numbers, where none was
+    # Of each of the names, of nothing, and of something else.
+    right: tuple[bool, ...]
+
+    @property
+    def said_is_right(self) -> bool:
+        """Whether the name that was given is right."""
+        every = [*self.contest.names, (NOTHING,), (SOMETHING_ELSE,)]
+        return any(
+            right and self.said in names for names, right in zip(every, self.right, strict=True)
+        )
+
+    @property
+    def holds(self) -> bool:
+        """Whether the set that is left open holds the truth."""
+        left = self.contest.left_open(self.said)
+        every = [*self.contest.names, (NOTHING,), (SOMETHING_ELSE,)]
+        return any(right and each in left for each, right in zip(every, self.right, strict=True))
+
+    @property
+    def size(self) -> int:
+        """Statements that are left open: a function at a place holds the formulas of that place."""
+        left = list(self.contest.left_open(self.said))
+        places = {name for names in left for name in names}
+        return sum(not any(_families(name) & places for name in names) for names in left) or 1
+
+    def kept(self) -> dict[str, object]:
+        """As a row keeps it."""
+        return asdict(self)
+
+    @staticmethod
+    def of_row(kept: dict[str, object]) -> 'JudgedContest':
+        """What a row kept."""
+        fields: dict[str, object] = dict(kept['contest'])  # type: ignore[call-overload]
+        fields['names'] = tuple(map(tuple, fields['names']))  # type: ignore[call-overload]
+        fields['gains'] = tuple(fields['gains'])  # type: ignore[arg-type]
+        return JudgedContest(
+            Contest(**fields),  # type: ignore[arg-type]
+            str(kept['joint']),
+            str(kept['said']),
+            tuple(kept['right']),  # type: ignore[arg-type]
+        )
+
+
+def judged_contests(
+    case: Case, said: Explanation, told: Sequence[Law]
+) -> tuple[JudgedContest, ...]:
+    """What was tried for each thing that may be missing, beside the truth.
+
+    Laws that are not `told` from other numbers are one with these.
+    """
+    found = list(_contests(said))
+    named = [(name, joint) for name, joint, _ in found if name not in (NOTHING, OTHER_NUMBERS)]
+    return tuple(
+        JudgedContest(contest, joint, name, _right(case, told, named, name, joint, contest))
+        for name, joint, contest in found
+    )
+
+
+def _contests(said: Explanation) -> Iterator[tuple[str, str, Contest]]:
+    for effect in said.effects:
+        if effect.contest is not None:
+            yield effect.id, effect.joint, effect.contest
+    term = said.unknown
+    if term is not None and not term.siblings and term.contest is not None:
+        yield term.place, term.joint, term.contest
+    for joint, contest in said.contests.items():
+        numbers = any(OTHER_NUMBERS in names for names in contest.names)
+        yield OTHER_NUMBERS if numbers else NOTHING, joint, contest
+
+
+def _right(
+    case: Case,
+    told: Sequence[Law],
+    named: Sequence[tuple[str, str]],
+    name: str,
+    joint: str,
+    contest: Contest,
+) -> tuple[bool, ...]:
+    others = [each for each in named if each != (name, joint)]
+    here = [
+        law
+        for law in told
+        if law.joint in ('', joint) and not any(is_of(*each, law) for each in others)
+    ]
+
+    def of_a_law(one: str) -> bool:
+        if one == OTHER_NUMBERS:
+            return not here
+        return any(is_of(one, joint, law) for law in case.laws) or _is_form(one, case.also)
+
+    right = [any(map(of_a_law, names)) for names in contest.names]
+    return *right, not here, bool(here) and not any(right)
+
+
+def _is_form(name: str, also: Collection[str]) -> bool:
+    """Whether a name is of the form of the rig itself."""
+    return name in also or bool(_families(name) & set(also))
+
+
+def _families(name: str) -> set[str]:
+    return set(CATALOGUE[name].traits.families) if name in CATALOGUE else set()
