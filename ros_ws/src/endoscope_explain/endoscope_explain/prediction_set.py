@@ -15,7 +15,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.special import softmax
 
 from endoscope_explain.criteria import LEAST_PROBABILITY, POSTERIOR
@@ -53,15 +53,8 @@ class Contest:
 
     def probabilities(self, weights: Sequence[float] = POSTERIOR) -> Array:
         """Probability (k + 2,) of each of the names, of nothing, and of something else."""
-        w, gains = np.array(weights), np.array(self.gains)
-        top = float(np.max(gains, initial=0.0))
-        left = math.log(max(self.beyond_form, 1.0))
-        of = np.array([1.0, math.log1p(top), math.log1p(max(self.form, 0.0)), left])
-        low, high = math.log(_COLDEST), math.log(_HOTTEST)
-        temperature = math.exp(float(np.clip(of @ w[:4], low, high)))
-        nothing = -top / temperature + w[4] + w[5] * self.found
-        odds = [*((gains - top) / temperature), nothing, w[6] + w[7] * left]
-        return np.asarray(softmax(odds))
+        odds = log_odds([self.gains], [self.form], [self.found], [self.beyond_form], weights)
+        return np.asarray(softmax(odds[0]))
 
     def posterior(self) -> Posterior:
         """All that was tried, and nothing, and something else, with their probabilities."""
@@ -78,6 +71,27 @@ class Contest:
     def probability(self, said: str) -> float:
         """Probability of what is said."""
         return next((p for names, p in self.posterior().items() if said in names), math.nan)
+
+
+def log_odds(
+    gains: ArrayLike,
+    form: ArrayLike,
+    found: ArrayLike,
+    beyond_form: ArrayLike,
+    weights: Sequence[float],
+) -> Array:
+    """Logarithm (m, k + 2) of the odds of names, of nothing, and of something else.
+
+    Of m contests, as in `Contest`; `gains` (m, k) are minus infinity where there is no name.
+    """
+    w, gained = np.array(weights), np.array(gains, dtype=float)
+    top = np.max(gained, axis=1, initial=0.0)
+    left = np.log(np.maximum(beyond_form, 1.0))
+    of = np.stack([np.ones_like(top), np.log1p(top), np.log1p(np.maximum(form, 0.0)), left])
+    temperature = np.exp(np.clip(w[:4] @ of, math.log(_COLDEST), math.log(_HOTTEST)))
+    names = (gained - top[:, None]) / temperature[:, None]
+    nothing = -top / temperature + w[4] + w[5] * np.array(found)
+    return np.column_stack([names, nothing, w[6] + w[7] * left])
 
 
 def alternatives(left: Posterior, said: str) -> tuple[str, ...]:

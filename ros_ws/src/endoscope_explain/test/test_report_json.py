@@ -17,7 +17,7 @@ from endoscope_explain.explanation import Estimate, NominalEstimate, Verdict
 from endoscope_explain.report.writing import KEYS, report_mapping, write_report
 
 EFFECT = {'id', 'joint', 'stage', 'equation', 'source', 'parameters', 'probability'}
-EFFECT |= {'alternatives', 'evidence'}
+EFFECT |= {'alternatives', 'evidence', 'left_open'}
 STAGES = {'actuator', 'transmission', 'joint', 'sensing', 'recording'}
 
 

@@ -55,7 +55,11 @@ class Decision:
     @property
     def adequate(self) -> bool:
         """Whether the chosen plant leaves noise, or no more than another form would."""
-        return self.beyond_form <= BEYOND_FORM
+        return _is_adequate(self.chosen)
+
+
+def _is_adequate(one: Candidate) -> bool:
+    return (one.fit.beyond_form or 0.0) <= BEYOND_FORM
 
 
 def decide(search: JointSearch, jobs: int) -> Decision:
@@ -74,9 +78,13 @@ def decide(search: JointSearch, jobs: int) -> Decision:
         best = _with_form(best, jobs)
         if any(not t.is_function and may_be_absent(best.fit, t.effect) for t in best.terms):
             break
+        term = _missing(level, best, jobs)
+        if not term.is_known and _is_adequate(chosen := _with_form(chosen, jobs)):
+            # A function of no name repairs any form, and no more than another form leaves is left.
+            break
         chosen, left = best, None
         if not best.terms[-1].multiplies:
-            missing = (*missing[: len(best.terms) - 1], _missing(level, best, jobs))
+            missing = (*missing[: len(best.terms) - 1], term)
     missing = _named_as_chosen(search, chosen, missing, jobs)
     chosen = _with_form(chosen, jobs)
     explained = share_explained(search.nominal, chosen)

@@ -80,6 +80,7 @@ def html_page(case: ExplainedCase) -> str:
         numbers_of=numbers.numbers_of,
         label=sentences.label,
         how_sure=sentences.how_sure,
+        what_is_open=sentences.what_is_open,
         physics_of=sentences.physics_of,
         meaning=sentences.EVIDENCE,
         joint=joint,

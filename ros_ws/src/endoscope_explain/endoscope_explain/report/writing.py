@@ -27,6 +27,7 @@ from endoscope_explain.explanation import (
     Verdict,
 )
 from endoscope_explain.fit.free_parameters import tolerance
+from endoscope_explain.prediction_set import Posterior
 from endoscope_explain.report.html_page import html_page
 
 SCHEMA = 1
@@ -38,7 +39,9 @@ KEYS = {
     'where': 'most important first: `stage`, `joint`, `signals`, `intervals` in s from the first '
     'stamp, `regime` in words, `band_hz`',
     'effects': 'what was left out, most certain first: `id`, `joint`, `stage`, `probability`, '
-    '`equation`, `source`, `parameters`, `alternatives`, `evidence`',
+    '`equation`, `source`, `parameters`, `alternatives`, `evidence`, and `left_open`, the set of '
+    'names that holds the truth with 90 %: `names` that are one statement here, `probability`',
+    'left_open': 'by joint, the same where nothing, or nothing more, is said to be missing',
     'parameters': 'by joint and name: `nominal`, `value`, `low` and `high` of 90 %, `unit`, '
     '`in_band`, `shown`, `together_with`',
     'fit': 'by compared plant (`nominal`, `refitted`, `augmented`) and signal, held out: `rmse`, '
@@ -59,6 +62,10 @@ def report_mapping(case: ExplainedCase) -> dict[str, Any]:
         'rig': case.recording.rig_kind.as_json(),
         'where': [_place(place) for place in case.places],
         'effects': [_effect(effect) for effect in case.effects],
+        'left_open': {
+            joint: _left_open(case.explanation.left_open(joint))
+            for joint in case.explanation.contests
+        },
         'parameters': {
             joint: {name: _nominal(name, e, case.band) for name, e in estimates.items()}
             for joint, estimates in case.explanation.parameters.items()
@@ -100,7 +107,12 @@ def _effect(effect: NamedEffect) -> dict[str, Any]:
         },
         'alternatives': list(effect.alternatives),
         'evidence': {k: float(v) for k, v in effect.evidence.items() if math.isfinite(v)},
+        'left_open': _left_open(effect.left_open),
     }
+
+
+def _left_open(left: Posterior) -> list[dict[str, Any]]:
+    return [{'names': list(names), 'probability': p} for names, p in left.items()]
 
 
 def _estimate(e: Estimate, least: float = -math.inf, most: float = math.inf) -> dict[str, Any]:

@@ -33,6 +33,9 @@ Array = NDArray[np.float64]
 FINER = (2 * COEFFICIENTS, 4 * COEFFICIENTS, NODES)
 """Coefficients of finer functions: twice as many each time, up to a value for every node."""
 TRIAL_STEPS = 6
+FINE = 3
+"""Ticks in one of these simulations: on nine levels of six development cases, derivatives by single
+ticks gained 8 nats more of 299, and else 1 at most, at four times the cost."""
 ITERATIONS, ROUGH, SETTLED = 25, 1e-2, 1e-4
 """Steps of a fit, at most, and the shares of the cost below which it tells and below which it
 stands."""
@@ -238,10 +241,10 @@ def _converged_together(one: Candidate) -> Candidate:
 
 
 def by_fine_derivatives(one: Candidate) -> Candidate:
-    """A candidate fitted on by derivatives on fine ticks, where coarse ones may mislead."""
+    """A candidate fitted on by derivatives on finer ticks, where coarse ones may mislead."""
     if len(one.fits) > 1:
         return one  # fitted together by such derivatives
-    model = replace(one.fit.model, coarse=1)
+    model = replace(one.fit.model, coarse=FINE)
     weight = weights(model.observation, one.fit.residuals)
     found = fit(model, one.fit.theta, weight, tolerance=SETTLED)
     again = candidate(one.terms, replace(found, model=one.fit.model))

@@ -9,10 +9,12 @@ from textwrap import fill
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
+from scipy.special import logsumexp
 
 from endoscope_core.atomic_output import write_text
 from endoscope_core.errors import EndoscopeError
 from endoscope_explain.criteria import POSTERIOR
+from endoscope_explain.prediction_set import log_odds
 from endoscope_lab.concealed.row import Row
 from endoscope_lab.concealed.sets import JudgedContest
 
@@ -52,7 +54,6 @@ WIDE = 10.0
 """Standard deviation of a weight before anything is known: odds of e to the power of ten."""
 LEAST = 1e-6
 """Probability below which being wrong costs no more: one case must not decide alone."""
-STEPS = {'maxiter': 4000, 'xatol': 1e-3, 'fatol': 1e-4}
 
 
 @dataclass(frozen=True)
@@ -124,17 +125,27 @@ def _crossed(bank: Bank) -> list[tuple[JudgedContest, float]]:
 
 def _likeliest(contests: Sequence[JudgedContest]) -> tuple[float, ...]:
     """Weights under which what is right is most likely, with a wide prior that bounds them."""
+    tried = [each.contest for each in contests]
+    most = max(len(each.names) for each in tried)
+    gains = np.full((len(tried), most), -np.inf)
+    right = np.zeros((len(tried), most + 2), dtype=bool)
+    for k, each in enumerate(contests):
+        own = len(each.contest.gains)
+        gains[k, :own] = each.contest.gains
+        right[k, :own], right[k, -2:] = each.right[:own], each.right[own:]
+    form, found, beyond = (
+        np.array([getattr(each, name) for each in tried])
+        for name in ('form', 'found', 'beyond_form')
+    )
 
     def cost(weights: Array) -> float:
-        chances = [
-            float(np.sum(each.contest.probabilities(weights.tolist())[np.array(each.right)]))
-            for each in contests
-        ]
-        likely = float(np.sum(np.log(np.maximum(chances, LEAST))))
-        return 0.5 * float(np.sum((weights / WIDE) ** 2)) - likely
+        odds = log_odds(gains, form, found, beyond, weights.tolist())
+        likely = logsumexp(odds, axis=1, b=right) - logsumexp(odds, axis=1)
+        bounded = np.logaddexp(likely, math.log(LEAST))
+        return 0.5 * float(np.sum((weights / WIDE) ** 2)) - float(np.sum(bounded))
 
-    found = minimize(cost, np.array(POSTERIOR), method='Nelder-Mead', options=STEPS)
-    return tuple(found.x.tolist())
+    found_at = minimize(cost, np.array(POSTERIOR), method='BFGS')
+    return tuple(found_at.x.tolist())
 
 
 def reliability(bank: Bank) -> str:
