@@ -114,6 +114,7 @@ def explain_recording(
         fit=ladder(references, searches, decisions),
         candidates=candidates(observations, searches),
         unknown=missing_function(decisions),
+        repairs_form=tuple((joint, place) for joint, d in of_joint.items() for place in d.repairs),
         adequate=all(d.adequate for d in decisions),
         beyond_form=max(d.beyond_form for d in decisions),
         fitting={joint: fitting(d.chosen.fit) for joint, d in of_joint.items()},

@@ -197,6 +197,9 @@ class Explanation:
     fit: Mapping[str, Mapping[str, ChannelFit]]
     candidates: tuple[Tried, ...] = ()  # candidates that were refitted, best first
     unknown: UnknownTerm | None = None  # the missing term for `unknown_physics`
+    # Joint and place of functions of the augmented plant that are no finding: they repair what
+    # another form of the plant would leave.
+    repairs_form: tuple[tuple[str, str], ...] = ()
     adequate: bool = True  # the augmented plant leaves nothing but noise and small errors of form
     # What it leaves over what rigs of another form leave, of the worst joint.
     beyond_form: float = math.nan

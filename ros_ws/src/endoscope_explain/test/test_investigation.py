@@ -29,6 +29,7 @@ from endoscope_explain.investigation.motions import (
 )
 from endoscope_explain.observe.revisits import EVERY_S, LEAST_SHARE, seen_before, strokes
 from endoscope_explain.pipeline import Inputs, Sources, explain_case
+from endoscope_explain.prediction_set import Contest
 from endoscope_explain.report.visited_once import once_only
 from endoscope_explain.takes import inputs_joined
 
@@ -205,13 +206,13 @@ def test_what_breaks_off_loses_nothing_and_is_called_what_it_was(
 
 
 def test_numbers_that_an_effect_may_stand_for_are_asked_about(both, told):
-    instead = {'bend_x': ('gravity', 'load_of_angle')}
+    tried = Contest((('other numbers',), ('gravity', 'load_of_angle')), (9.0, 9.0), 5.0, False)
     found = {'effects': (), 'verdict': Verdict.PARAMETERS_DIFFER}
-    explanation = dataclasses.replace(told.explanation, instead=instead, **found)
+    explanation = dataclasses.replace(told.explanation, contests={'bend_x': tried}, **found)
     left_open = dataclasses.replace(told, explanation=explanation, **found)
     log = investigate(both, no_rig, lambda bags, known: left_open)
     (name,) = log.last_answer.names
-    assert (name.id, name.joint, name.rivals) == ('other numbers', 'bend_x', instead['bend_x'])
+    assert (name.id, name.joint, name.rivals) == ('other numbers', 'bend_x', tried.names[1])
     assert log.stopped is not Stop.ONE_CLASS
 
 

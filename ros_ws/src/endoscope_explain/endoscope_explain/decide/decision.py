@@ -30,6 +30,8 @@ class MissingTerm:
     margin: float  # by how much more than the best other name
     p_value: float  # chance that a rig in which nothing is missing shows as much
     formula: Candidate | None  # with the formula of `name`, where it was fitted
+    # A function that repairs what another form leaves: the plant has it, and it is no finding.
+    repairs_form: bool = False
 
     @property
     def is_known(self) -> bool:
@@ -46,6 +48,7 @@ class Decision:
     explained: float  # share of the excess misfit that the terms remove; 1 where there was none
     # Names that were tried for what else might be missing; None where only noise is left.
     open: Contest | None = None
+    repairs: tuple[str, ...] = ()  # functions that are no finding; see `MissingTerm.repairs_form`
 
     @property
     def beyond_form(self) -> float:
@@ -78,18 +81,23 @@ def decide(search: JointSearch, jobs: int) -> Decision:
         best = _with_form(best, jobs)
         if any(not t.is_function and may_be_absent(best.fit, t.effect) for t in best.terms):
             break
+        before, chosen = chosen, best
+        if best.terms[-1].multiplies:
+            left = None
+            continue
         term = _missing(level, best, jobs)
-        if not term.is_known and _is_adequate(chosen := _with_form(chosen, jobs)):
-            # A function of no name repairs any form, and no more than another form leaves is left.
-            break
-        chosen, left = best, None
-        if not best.terms[-1].multiplies:
-            missing = (*missing[: len(best.terms) - 1], term)
+        # A function of no name repairs any form: where no more was left than another form leaves,
+        # nothing is missing.
+        form = not term.is_known and _is_adequate(_with_form(before, jobs))
+        left = left if form else None
+        missing = (*missing[: len(best.terms) - 1], replace(term, repairs_form=form))
     missing = _named_as_chosen(search, chosen, missing, jobs)
+    repairs = tuple(term.term.id for term in missing if term.repairs_form)
+    missing = tuple(term for term in missing if not term.repairs_form)
     chosen = _with_form(chosen, jobs)
     explained = share_explained(search.nominal, chosen)
     left = left and left.without(term.name for term in missing)
-    return Decision(chosen, missing, explained, left)
+    return Decision(chosen, missing, explained, left, repairs)
 
 
 def found_together(search: JointSearch, jobs: int) -> tuple[MissingTerm, ...]:

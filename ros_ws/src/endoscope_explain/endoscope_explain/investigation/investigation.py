@@ -236,12 +236,9 @@ def _strength(effect: NamedEffect) -> str:
 
 
 def _beside_numbers(case: ExplainedCase) -> dict[str, tuple[str, ...]]:
-    """By joint, effects that may be missing where no more than other numbers is said to be."""
-    return {
-        joint: names
-        for joint in case.explanation.contests
-        if (names := tuple(n for n in case.explanation.instead(joint) if n in KNOWN))
-    }
+    """By joint, what may be missing where no more than other numbers is said to be."""
+    open_ones = {joint: case.explanation.instead(joint) for joint in case.explanation.contests}
+    return {joint: names for joint, names in open_ones.items() if names}
 
 
 def _asks_more(case: ExplainedCase) -> bool:

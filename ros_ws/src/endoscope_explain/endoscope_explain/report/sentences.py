@@ -189,6 +189,11 @@ def reservations(case: ExplainedCase) -> list[str]:
         left = case.explanation.left_open(joint)
         if any(name in KNOWN for names in left for name in names):
             said.append(f'Whether {joint} lacks something more stays open: {in_words(left)}.')
+    said += [
+        f'The improved plant has {_function_of(place)} on {joint} as well: it repairs no more than '
+        'another form of the plant would leave.'
+        for joint, place in case.explanation.repairs_form
+    ]
     off = _off(case)
     if off:
         signal, ratio = max(off.items(), key=lambda item: item[1])

@@ -33,9 +33,9 @@ Array = NDArray[np.float64]
 FINER = (2 * COEFFICIENTS, 4 * COEFFICIENTS, NODES)
 """Coefficients of finer functions: twice as many each time, up to a value for every node."""
 TRIAL_STEPS = 6
-FINE = 3
+FINE = 2
 """Ticks in one of these simulations: on nine levels of six development cases, derivatives by single
-ticks gained 8 nats more of 299, and else 1 at most, at four times the cost."""
+ticks gained 4 nats more of 299 and else 2 at most, at twice the cost."""
 ITERATIONS, ROUGH, SETTLED = 25, 1e-2, 1e-4
 """Steps of a fit, at most, and the shares of the cost below which it tells and below which it
 stands."""
