@@ -25,6 +25,7 @@ from endoscope_explain.decide.given_physics import GivenJoints
 from endoscope_explain.design import propose
 from endoscope_explain.explain_recording import Progress, explain_recording
 from endoscope_explain.explanation import Explanation, Verdict
+from endoscope_explain.fit.between_rows import with_command_between_rows
 from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.fit.nominal import with_isolated_marked
 from endoscope_explain.locate.locating import (
@@ -99,14 +100,19 @@ def read_inputs(sources: Sources) -> Inputs:
             return None
         other = read(path, plant)
         refuse_other_joints(path, other.joints, sources.bag, raw.joints)
-        audited = audit_recording(other, plant)
+        audited = _audited(other, plant)
         mistakes = audited.mistakes()
         said.extend(f'the {what} {other.name}: {f.text}; {f.remedy}' for f in mistakes)
         return audited.recording
 
     baseline = second('baseline', sources.baseline)
     validation = second('second recording', sources.validate)
-    return Inputs(sources, audit_recording(raw, plant), baseline, validation, tuple(said))
+    return Inputs(sources, _audited(raw, plant), baseline, validation, tuple(said))
+
+
+def _audited(raw: Recording, plant: PlantDescription) -> AuditReport:
+    report = audit_recording(raw, plant)
+    return replace(report, recording=with_command_between_rows(report.recording, plant))
 
 
 def refuse_other_joints(

@@ -17,8 +17,8 @@ ROW = replace(
     nominal=60.0,
     refitted=7.0,
     augmented=1.05,
-    held=15,
-    intervals=16,
+    held=2,
+    intervals=2,
     errors=(1.0, 0.2),
 )
 

@@ -14,7 +14,7 @@ from endoscope_explain.fit.free_parameters import tolerance
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.observe.predicted_signals import RecordedView, view
 from endoscope_explain.observe.revisits import motion_repeats
-from endoscope_explain.report import numbers, sentences
+from endoscope_explain.report import left_open, numbers, sentences
 from endoscope_explain.report.figures import experiment_figure, ladder_figure, unknown_figure
 from endoscope_explain.report.passage import (
     passage_figure,
@@ -80,7 +80,7 @@ def html_page(case: ExplainedCase) -> str:
         numbers_of=numbers.numbers_of,
         label=sentences.label,
         how_sure=sentences.how_sure,
-        what_is_open=sentences.what_is_open,
+        what_is_open=left_open.what_is_open,
         physics_of=sentences.physics_of,
         meaning=sentences.EVIDENCE,
         joint=joint,

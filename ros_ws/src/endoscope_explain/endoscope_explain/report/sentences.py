@@ -1,14 +1,13 @@
 """What was found, in sentences of at most twenty words, and as lines for the terminal."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from endoscope_core.physics.effects import CATALOGUE, KNOWN
-from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_explain.case import ExplainedCase, Place, changed_parameters
 from endoscope_explain.explanation import NamedEffect, NominalEstimate, Verdict
-from endoscope_explain.prediction_set import Posterior
 from endoscope_explain.recording import axis
+from endoscope_explain.report.left_open import function_of, in_words
 from endoscope_explain.report.numbers import (
     PLANTS,
     digits,
@@ -110,31 +109,6 @@ def how_sure(effect: NamedEffect) -> str:
     return f'On simulated rigs, {of_hundred} of a hundred names as clear were right.'
 
 
-def in_words(left: Posterior) -> str:
-    """Names of a set with their probabilities, the likeliest first."""
-    return _any(f'{_one_statement(names)} ({p:.2f})' for names, p in left.items())
-
-
-def _one_statement(names: Sequence[str]) -> str:
-    """Names that are one statement in a recording."""
-    first, *same = [_function_of(n) if n in FUNCTIONS else n for n in names]
-    return f'{first}, here the same as {_all(same)},' if same else first
-
-
-def _function_of(place: str) -> str:
-    return f'a function of {FUNCTIONS[place].argument.words} ({place})'
-
-
-def what_is_open(effect: NamedEffect) -> str:
-    """The names that a recording leaves open for one effect."""
-    left = effect.left_open
-    if len(left) > 1:
-        return f'The recording leaves open: {in_words(left)}.'
-    if effect.alternatives:
-        return f'The data cannot distinguish it from {_any(effect.alternatives)}.'
-    return 'No alternative fits as well.'
-
-
 def where(place: Place) -> str:
     """Where a mismatch shows: in which state of the rig, or in which signals."""
     how = place.regime if place.shares else ' and '.join(map(plain, place.signals))
@@ -190,7 +164,7 @@ def reservations(case: ExplainedCase) -> list[str]:
         if any(name in KNOWN for names in left for name in names):
             said.append(f'Whether {joint} lacks something more stays open: {in_words(left)}.')
     said += [
-        f'The improved plant has {_function_of(place)} on {joint} as well: it repairs no more than '
+        f'The improved plant has {function_of(place)} on {joint} as well: it repairs no more than '
         'another form of the plant would leave.'
         for joint, place in case.explanation.repairs_form
     ]
@@ -355,14 +329,9 @@ def _named(effect: NamedEffect) -> str:
     """An effect, and the names that the recording cannot tell from it."""
     left = effect.left_open
     if len(left) > 1:
-        return f'on {effect.joint} {in_words(left)}'
+        return f'{in_words(left)} on {effect.joint}'
     rival = f' or {effect.alternatives[0]}' if effect.alternatives else ''
     return f'{effect.id}{rival} on {effect.joint}'
-
-
-def _any(names: Iterable[str]) -> str:
-    *most, last = names
-    return f'{", ".join(most)} or {last}' if most else last
 
 
 def _all(names: Sequence[str]) -> str:

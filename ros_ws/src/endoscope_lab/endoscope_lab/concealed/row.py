@@ -2,15 +2,17 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isclose
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from endoscope_explain.criteria import INTERVAL_WIDTH
 from endoscope_lab.bench import kept_rows, table_head, table_row
 from endoscope_lab.concealed.judge import Judgement
+from endoscope_lab.concealed.sets import JudgedContest, all_hold, mean_size
 
 GOOD = 1.3
 """Rmse over noise up to which a second recording is predicted."""
@@ -122,8 +124,19 @@ cost, in which a misfit of twice the noise has a share of a hundredth."""
 
 
 def rows_of(file: Path) -> dict[CaseKey, Row]:
-    """Read a record; EndoscopeError for a line that is none of a row."""
-    return {(row.stratum, row.seed): row for row in kept_rows(file, Row)}
+    """Read a record, its sets and intervals by the criteria in force.
+
+    EndoscopeError for a line that is none of a row.
+    """
+    return {(row.stratum, row.seed): _by_criteria(row) for row in kept_rows(file, Row)}
+
+
+def _by_criteria(row: Row) -> Row:
+    if row.verdict == 'FAILED':
+        return row
+    contests = [JudgedContest.of_row(each) for each in row.contests]
+    held = sum(error <= INTERVAL_WIDTH for error in row.errors)
+    return replace(row, in_set=all_hold(contests), set_size=mean_size(contests), held=held)
 
 
 def differences(before: Row, now: Row) -> Iterator[str]:

@@ -3,6 +3,8 @@
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass
 
+import numpy as np
+
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.explanation import Explanation
 from endoscope_explain.prediction_set import NOTHING, OTHER_NUMBERS, SOMETHING_ELSE, Contest
@@ -57,6 +59,16 @@ class JudgedContest:
             str(kept['said']),
             tuple(kept['right']),  # type: ignore[arg-type]
         )
+
+
+def all_hold(contests: Sequence[JudgedContest]) -> bool:
+    """Whether every set of a case holds the truth."""
+    return all(each.holds for each in contests)
+
+
+def mean_size(contests: Sequence[JudgedContest]) -> float:
+    """Statements that a set of a case leaves open; one where only noise was left."""
+    return float(np.mean([each.size for each in contests])) if contests else 1.0
 
 
 def judged_contests(

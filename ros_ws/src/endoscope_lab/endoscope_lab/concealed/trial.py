@@ -6,7 +6,6 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from endoscope_core.physics import PlantDescription
@@ -25,7 +24,7 @@ from endoscope_lab.concealed.judge import (
 )
 from endoscope_lab.concealed.readings import misfit
 from endoscope_lab.concealed.row import Row, differences, rows_of, table
-from endoscope_lab.concealed.sets import judged_contests
+from endoscope_lab.concealed.sets import all_hold, judged_contests, mean_size
 from endoscope_lab.concealed.strata import STRATA, drawn_case
 from endoscope_lab.concealed.strength import left
 
@@ -83,8 +82,8 @@ def judged_row(case: Case, said: Explanation, seconds: float) -> Row:
     contests = judged_contests(case, said, told)
     judgement = replace(
         judged(case.laws, names, case.also),
-        in_set=all(each.holds for each in contests),
-        set_size=float(np.mean([each.size for each in contests])) if contests else 1.0,
+        in_set=all_hold(contests),
+        set_size=mean_size(contests),
     )
     others = frozenset().union(*(law.ids for law in case.laws if law not in told))
     nominal, refitted, augmented = (
