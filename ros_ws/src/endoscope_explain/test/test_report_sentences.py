@@ -1,10 +1,16 @@
 import dataclasses
 import re
+from dataclasses import replace
 
+import numpy as np
+import pytest
 from test_report_html import PLANT, is_short, named, text_of, with_explanation
 
-from endoscope_explain.explanation import NominalEstimate, Verdict
+from endoscope_explain import prediction_set
+from endoscope_explain.explanation import ChannelFit, NominalEstimate, Verdict
+from endoscope_explain.prediction_set import Contest
 from endoscope_explain.report.html_page import html_page
+from endoscope_explain.report.left_open import what_is_open
 from endoscope_explain.report.sentences import next_step, reservations, told, verdict_sentence
 
 
@@ -69,3 +75,41 @@ def test_what_names_leave_over_and_what_differs_besides_is_said_under_the_headli
     assert stays in text
     assert besides in text
     assert told(case).splitlines()[1:3] == [stays, besides]
+
+
+def test_names_that_are_left_open_are_said_with_their_probabilities(stribeck_case, monkeypatch):
+    monkeypatch.setattr(prediction_set, 'LEAST_PROBABILITY', (0.1, 0.1))
+    monkeypatch.setattr(Contest, 'probabilities', lambda _: np.array([0.6, 0.3, 0.02, 0.08]))
+    names = (('stribeck_friction',), ('exponent_of_speed', 'viscous_friction'))
+    tried = Contest(names, (90.0, 80.0), 5.0, found=True)
+    (effect,) = stribeck_case.effects
+    effect = replace(effect, contest=tried, alternatives=names[1])
+    case = with_explanation(stribeck_case, effects=(effect,), contests={'bend_x': tried})
+    said = (
+        'stribeck_friction (0.60) or exponent_of_speed (a function of sliding speed, never '
+        'negative, here the same as viscous_friction, 0.30)'
+    )
+    assert verdict_sentence(case) == f'The simulation leaves out {said} on bend_x.'
+    assert what_is_open(effect) == f'The recording leaves open: {said}.'
+    assert any('Whether bend_x lacks something more' in line for line in reservations(case))
+    assert what_is_open(replace(effect, contest=None, alternatives=())).startswith('No alternative')
+
+
+def test_a_function_that_repairs_form_is_said_to_be_in_the_plant(stribeck_case):
+    case = with_explanation(stribeck_case, repairs_form=(('bend_y', 'load_of_angle'),))
+    assert any(
+        line.startswith("The improved plant has a function of the joint's angle on bend_y as well")
+        for line in reservations(case)
+    )
+
+
+@pytest.mark.parametrize(('ratio', 'kind'), [(1.1, 'best'), (245.0, 'bad')])
+def test_a_signal_that_stays_far_off_is_not_marked_as_well_explained(stribeck_case, ratio, kind):
+    signal = next(iter(stribeck_case.ladder['nominal']))
+    fits = {signal: ChannelFit(ratio, 1.0)}
+    case = replace(stribeck_case, ladder={'nominal': fits, 'refitted': fits, 'augmented': fits})
+    cells = re.findall(
+        r'<td class="(best|bad)">', html_page(case).split('<h2>The ladder of fits')[1]
+    )
+    assert kind in cells
+    assert {'best', 'bad'} - {kind} != set(cells)

@@ -52,6 +52,8 @@ CHAIN = {
 }
 """From command to recording: each stage by its one name, and what it is or is read of it."""
 
+FAR_OFF = 2.0
+"""Misfit over noise from which on a signal is marked: what is not noise is more than noise then."""
 DRAWINGS = ('unknown', 'timeline', 'loops', 'ladder', 'experiment')
 
 
@@ -80,6 +82,7 @@ def html_page(case: ExplainedCase) -> str:
         numbers_of=numbers.numbers_of,
         label=sentences.label,
         how_sure=sentences.how_sure,
+        far_off=FAR_OFF,
         what_is_open=left_open.what_is_open,
         physics_of=sentences.physics_of,
         meaning=sentences.EVIDENCE,
@@ -211,6 +214,11 @@ def _tables(case: ExplainedCase, ladder: Ladder) -> list[dict[str, Any]]:
     ]
 
 
+def _kind(ratio: float) -> str:
+    """How the best of a row is marked, by what it leaves over noise."""
+    return 'bad' if ratio > FAR_OFF else 'best'
+
+
 def _row(signal: str, models: Ladder) -> dict[str, Any]:
     """What each model leaves of a signal; empty where one does not predict it."""
     fits = [fits.get(signal) for fits in models.values()]
@@ -219,7 +227,7 @@ def _row(signal: str, models: Ladder) -> dict[str, Any]:
     cells = [
         {
             'text': f'{text} ({numbers.digits(f.ratio)})' if f else '',
-            'best': f is not None and f.rmse <= 1.02 * least,
+            'kind': '' if f is None or f.rmse > 1.02 * least else _kind(f.ratio),
         }
         for f, (text, _) in zip(fits, texts, strict=True)
     ]

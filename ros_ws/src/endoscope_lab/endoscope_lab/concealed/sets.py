@@ -66,6 +66,21 @@ def all_hold(contests: Sequence[JudgedContest]) -> bool:
     return all(each.holds for each in contests)
 
 
+def all_are_said(contests: Sequence[JudgedContest], laws: Sequence[Law]) -> bool:
+    """Whether every law is one, in its recording, with what is said on its joint."""
+
+    def said(law: Law) -> bool:
+        return any(
+            is_of(name, each.joint, law)
+            for each in contests
+            for names in each.contest.names
+            if each.said in names
+            for name in names
+        )
+
+    return bool(laws) and all(map(said, laws))
+
+
 def mean_size(contests: Sequence[JudgedContest]) -> float:
     """Statements that a set of a case leaves open; one where only noise was left."""
     return float(np.mean([each.size for each in contests])) if contests else 1.0

@@ -24,7 +24,12 @@ from endoscope_lab.concealed.judge import (
 )
 from endoscope_lab.concealed.readings import misfit
 from endoscope_lab.concealed.row import Row, differences, rows_of, table
-from endoscope_lab.concealed.sets import all_hold, judged_contests, mean_size
+from endoscope_lab.concealed.sets import (
+    all_are_said,
+    all_hold,
+    judged_contests,
+    mean_size,
+)
 from endoscope_lab.concealed.strata import STRATA, drawn_case
 from endoscope_lab.concealed.strength import left
 
@@ -80,11 +85,11 @@ def judged_row(case: Case, said: Explanation, seconds: float) -> Row:
     errors = [_error(*number) for number in _numbers(case, said)]
     told = told_from_numbers(case)
     contests = judged_contests(case, said, told)
-    judgement = replace(
-        judged(case.laws, names, case.also),
-        in_set=all_hold(contests),
-        set_size=mean_size(contests),
-    )
+    judgement = judged(case.laws, names, case.also)
+    if not judgement.false and all_are_said(contests, case.laws):
+        judgement = replace(judgement, first=True, place=True, stage=True, exact=True)
+    in_set, set_size = all_hold(contests), mean_size(contests)
+    judgement = replace(judgement, in_set=in_set, set_size=set_size)
     others = frozenset().union(*(law.ids for law in case.laws if law not in told))
     nominal, refitted, augmented = (
         misfit(plant, case.second, case.described.sensors)
@@ -109,7 +114,7 @@ def judged_row(case: Case, said: Explanation, seconds: float) -> Row:
         errors=tuple(INTERVAL_WIDTH * error for error in errors),
         contests=tuple(each.kept() for each in contests),
         told=tuple(map(_named, told)),
-        first_of_told=judged(told, names, case.also | others).first,
+        first_of_told=judgement.first or judged(told, names, case.also | others).first,
         **vars(judgement),
     )
 
