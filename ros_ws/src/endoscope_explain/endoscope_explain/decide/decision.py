@@ -86,9 +86,10 @@ def decide(search: JointSearch, jobs: int) -> Decision:
             left = None
             continue
         term = _missing(level, best, jobs)
-        # A function of no name repairs any form: where no more was left than another form leaves,
-        # nothing is missing.
-        form = not term.is_known and _is_adequate(_with_form(before, jobs))
+        # What leaves noise alone is what is missing. Else a function of no name repairs any form:
+        # where no more was left than another form leaves, nothing is.
+        unnamed = not (term.is_known or best.is_noise)
+        form = unnamed and _is_adequate(_with_form(before, jobs))
         left = left if form else None
         missing = (*missing[: len(best.terms) - 1], replace(term, repairs_form=form))
     missing = _named_as_chosen(search, chosen, missing, jobs)

@@ -121,17 +121,19 @@ def _right(
     joint: str,
     contest: Contest,
 ) -> tuple[bool, ...]:
+    # A law that another statement names is no second one.
     others = [each for each in named if each != (name, joint)]
-    here = [
+    left = [
         law
-        for law in told
+        for law in case.laws
         if law.joint in ('', joint) and not any(is_of(*each, law) for each in others)
     ]
+    here = [law for law in left if law in told]
 
     def of_a_law(one: str) -> bool:
         if one == OTHER_NUMBERS:
             return not here
-        return any(is_of(one, joint, law) for law in case.laws) or _is_form(one, case.also)
+        return any(is_of(one, joint, law) for law in left) or _is_form(one, case.also)
 
     right = [any(map(of_a_law, names)) for names in contest.names]
     return *right, not here, bool(here) and not any(right)
