@@ -205,6 +205,17 @@ def test_what_breaks_off_loses_nothing_and_is_called_what_it_was(
     assert f'endoscope {version("endoscope_explain")}' in html
 
 
+def test_names_that_were_given_or_left_open_are_known_to_the_next_explanation(both, stribeck_case):
+    known_then = []
+
+    def explain(bags, known):
+        known_then.append(known)
+        return stribeck_case
+
+    investigate(both, no_rig, explain)
+    assert known_then == [{}, {'bend_x': {'stribeck_friction', 'viscous_friction'}}]
+
+
 def test_numbers_that_an_effect_may_stand_for_are_asked_about(both, told):
     tried = Contest((('other numbers',), ('gravity', 'load_of_angle')), (9.0, 9.0), 5.0, False)
     found = {'effects': (), 'verdict': Verdict.PARAMETERS_DIFFER}

@@ -109,9 +109,11 @@ def test_gains_by_linear_algebra_are_those_of_the_residuals_themselves(reference
 
 def test_an_effect_is_found_by_its_formula_with_nothing_left(references):
     hidden = effect('joint_backlash', gap_rad=0.05)
-    tried = search([references(hidden)], 2)
+    tried = search([references(hidden)], 2, known=('cogging',))
     decision = decide(tried, 2)
     assert [term.name for term in decision.missing] == [hidden.id]
+    fitted = {term.id for each in tried.tried() for term in each.terms}
+    assert 'cogging' in fitted, 'what is known from elsewhere is fitted in any case'
     assert len(decision.missing[0].contest.left_open(decision.missing[0].name)) == 1
     assert decision.adequate
     found = decision.chosen.fit
