@@ -16,3 +16,5 @@ odds of nothing: of one, and of whether something is said to be missing. Then of
 else: of one, and of what is left."""
 LEAST_PROBABILITY = (0.1, 0.1)
 """Of what a set holds, where noise alone is left and where more is."""
+NAME_OF_FUNCTION = 0.8
+"""Chance that a function is a form of the effect whose formula comes nearest at its place."""

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import softmax
 
-from endoscope_explain.criteria import LEAST_PROBABILITY, POSTERIOR
+from endoscope_core.physics.effects import CATALOGUE
+from endoscope_explain.criteria import LEAST_PROBABILITY, NAME_OF_FUNCTION, POSTERIOR
 
 Array = NDArray[np.float64]
 
@@ -68,9 +69,19 @@ class Contest:
         every = self.posterior().items()
         return {names: p for names, p in every if p >= least or said in names}
 
-    def probability(self, said: str) -> float:
+    def probability(
+        self, said: str, weights: Sequence[float] = POSTERIOR, of_function: float = NAME_OF_FUNCTION
+    ) -> float:
         """Probability of what is said."""
-        return next((p for names, p in self.posterior().items() if said in names), math.nan)
+        # A function at a place is mostly a form of the effect whose formula comes nearest.
+        chances = self.probabilities(weights)
+        places = CATALOGUE[said].traits.families if said in CATALOGUE else ()
+        return float(
+            sum(
+                p if said in names else of_function * p * any(n in places for n in names)
+                for names, p in zip(self.names, chances, strict=False)
+            )
+        )
 
 
 def log_odds(
@@ -86,7 +97,7 @@ def log_odds(
     """
     w, gained = np.array(weights), np.array(gains, dtype=float)
     top = np.max(gained, axis=1, initial=0.0)
-    left = np.log(np.maximum(beyond_form, 1.0))
+    left = np.log1p(np.array(beyond_form))
     of = np.stack([np.ones_like(top), np.log1p(top), np.log1p(np.maximum(form, 0.0)), left])
     temperature = np.exp(np.clip(w[:4] @ of, math.log(_COLDEST), math.log(_HOTTEST)))
     names = (gained - top[:, None]) / temperature[:, None]

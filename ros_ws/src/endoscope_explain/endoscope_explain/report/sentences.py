@@ -241,12 +241,9 @@ def next_step(case: ExplainedCase) -> str:
     if case.next_experiment is not None:
         rivals = _all(case.next_experiment.separates)
         return f'Have the master play next_experiment.csv: it tells {rivals} apart.'
-    ambiguous = next((e for e in case.effects if e.alternatives), None)
-    if ambiguous is not None:
-        return (
-            f'Run again without --quick for the motion that tells {ambiguous.id} from '
-            f'{ambiguous.alternatives[0]}.'
-        )
+    untold = [(e.id, name) for e in case.effects for name in e.alternatives if name in KNOWN]
+    if untold:
+        return f'Run again without --quick for the motion that tells {" from ".join(untold[0])}.'
     if any(e.doubtful for e in case.effects):
         return 'Explain both recordings with --same-physics: what is named then explains both.'
     if case.verdict is Verdict.CONSISTENT:

@@ -50,8 +50,9 @@ HOLDS = 0.9
 ADEQUATE = 0.95
 """Share of right explanations that are called adequate."""
 PARTS = 10
-WIDE = 10.0
-"""Standard deviation of a weight before anything is known: odds of e to the power of ten."""
+PRIOR = np.array([3.0, 1.0, 1.0, 1.0, 3.0, 3.0, 3.0, 3.0])
+"""Standard deviations of the weights before anything is known: evidence in nats goes with no more
+than a power of one of anything, and odds are e to a few."""
 LEAST = 1e-6
 """Probability below which being wrong costs no more: one case must not decide alone."""
 
@@ -64,6 +65,7 @@ class Criteria:
     INTERVAL_WIDTH: float
     POSTERIOR: tuple[float, ...]
     LEAST_PROBABILITY: tuple[float, float]
+    NAME_OF_FUNCTION: float
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,14 @@ def derived(bank: Bank) -> Criteria:
         conformal(bank.errors, HOLDS),
         _likeliest(bank.contests),
         (max(least[0], 0.0), max(least[1], 0.0)),
+        _name_of_function(bank.contests),
     )
+
+
+def _name_of_function(contests: Sequence[JudgedContest]) -> float:
+    """How often the name is right where a function at its place is, by Laplace's rule."""
+    named = [each.said_is_right for each in contests if each.is_of_function]
+    return (1.0 + sum(named)) / (2.0 + len(named))
 
 
 def _crossed(bank: Bank) -> list[tuple[JudgedContest, float]]:
@@ -124,7 +133,7 @@ def _crossed(bank: Bank) -> list[tuple[JudgedContest, float]]:
 
 
 def _likeliest(contests: Sequence[JudgedContest]) -> tuple[float, ...]:
-    """Weights under which what is right is most likely, with a wide prior that bounds them."""
+    """Weights under which what is right is most likely, with a prior that bounds them."""
     tried = [each.contest for each in contests]
     most = max(len(each.names) for each in tried)
     gains = np.full((len(tried), most), -np.inf)
@@ -142,7 +151,7 @@ def _likeliest(contests: Sequence[JudgedContest]) -> tuple[float, ...]:
         odds = log_odds(gains, form, found, beyond, weights.tolist())
         likely = logsumexp(odds, axis=1, b=right) - logsumexp(odds, axis=1)
         bounded = np.logaddexp(likely, math.log(LEAST))
-        return 0.5 * float(np.sum((weights / WIDE) ** 2)) - float(np.sum(bounded))
+        return 0.5 * float(np.sum((weights / PRIOR) ** 2)) - float(np.sum(bounded))
 
     found_at = minimize(cost, np.array(POSTERIOR), method='BFGS')
     return tuple(found_at.x.tolist())
@@ -154,12 +163,11 @@ def reliability(bank: Bank) -> str:
     given, right = [], []
     for part in range(PARTS):
         own = bank.case % PARTS == part
-        weights = _likeliest([c for c, mine in zip(bank.contests, own, strict=True) if not mine])
+        others = [c for c, mine in zip(bank.contests, own, strict=True) if not mine]
+        weights, of_function = _likeliest(others), _name_of_function(others)
         for each, mine in zip(bank.contests, own, strict=True):
             if mine and each.contest.found:
-                of_names = each.contest.probabilities(weights)
-                which = [k for k, names in enumerate(each.contest.names) if each.said in names]
-                given.append(float(of_names[which[0]]))
+                given.append(each.contest.probability(each.said, weights, of_function))
                 right.append(each.said_is_right)
     chances, is_right = np.array(given), np.array(right, dtype=bool)
     lines = [f'{"probability":>14s}{"names":>7s}{"mean":>8s}{"right":>8s}']
@@ -232,4 +240,6 @@ odds of nothing: of one, and of whether something is said to be missing. Then of
 else: of one, and of what is left."""
 LEAST_PROBABILITY = ({', '.join(f'{least:.3g}' for least in criteria.LEAST_PROBABILITY)})
 """Of what a set holds, where noise alone is left and where more is."""
+NAME_OF_FUNCTION = {criteria.NAME_OF_FUNCTION:.3g}
+"""Chance that a function is a form of the effect whose formula comes nearest at its place."""
 '''

@@ -30,6 +30,13 @@ class JudgedContest:
         )
 
     @property
+    def is_of_function(self) -> bool:
+        """Whether an effect was named, and a function at its place is right."""
+        places = _families(self.said)
+        every = zip(self.contest.names, self.right, strict=False)
+        return any(right and bool(places & set(names)) for names, right in every)
+
+    @property
     def holds(self) -> bool:
         """Whether the set that is left open holds the truth."""
         left = self.contest.left_open(self.said)
