@@ -27,6 +27,7 @@ from endoscope_explain.explanation import NamedEffect
 from endoscope_explain.fit.free_parameters import LEAD, effect_parameters, nominal_parameters
 from endoscope_explain.fit.model import Fit, JointModel, fit, jacobian, joint_of, packed_joint
 from endoscope_explain.observe.observation import JointObservation, observe
+from endoscope_explain.prediction_set import OTHER_NUMBERS
 from endoscope_explain.recording import Recording, Series
 from endoscope_explain.search.screen import background, directions, screened
 from endoscope_explain.search.term import Term, starting_points
@@ -55,8 +56,6 @@ def as_played(time: Array, angle: Array, rig: Rig) -> tuple[Array, Array]:
 
 
 MOST_RIVALS = 3
-NUMBERS = 'other numbers'
-"""What a plant is called that has no effect more, but other numbers than were described."""
 MARGIN = 1.15
 """How far a proposed motion may go beyond the tensions and angles that were recorded."""
 SURE = 1.96
@@ -192,7 +191,7 @@ def propose_beside_numbers(
     bare = replace(plant, joints={**plant.joints, joint: described.joints[joint]})
     there = {e.id for e in plant.effects if e.joint == joint}
     rivals = [e for e in effects if e in KNOWN and e not in there]
-    plants = {NUMBERS: plant} | {
+    plants = {OTHER_NUMBERS: plant} | {
         rival: fitted
         for rival in rivals[: MOST_RIVALS - 1]
         if (fitted := _with_effect(recording, bare, joint, rival)) is not None

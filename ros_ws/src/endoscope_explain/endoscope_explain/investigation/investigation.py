@@ -17,7 +17,7 @@ from endoscope_core.physics.plant_file import load_plant, save_plant
 from endoscope_core.rig import Rig
 from endoscope_core.signals.command_file import JOINTS, write_command_file
 from endoscope_explain.case import ExplainedCase, NextExperiment
-from endoscope_explain.design import NUMBERS, is_wide, narrow, propose, propose_beside_numbers
+from endoscope_explain.design import is_wide, narrow, propose, propose_beside_numbers
 from endoscope_explain.explanation import NamedEffect, Verdict
 from endoscope_explain.investigation import log as logs
 from endoscope_explain.investigation.log import Answer, Log, Name, Round, Stop
@@ -29,6 +29,8 @@ from endoscope_explain.investigation.motions import (
 )
 from endoscope_explain.investigation.tracking import PlayThrough, held_out, with_tracking
 from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
+from endoscope_explain.prediction_set import OTHER_NUMBERS, Posterior
+from endoscope_explain.report.left_open import in_words
 from endoscope_explain.report.numbers import shown
 from endoscope_explain.report.sentences import verdict_sentence, where
 from endoscope_explain.takes import inputs_joined
@@ -223,11 +225,21 @@ def answer_of(case: ExplainedCase, seconds: float) -> Answer:
         max((each.ratio for each in fit[name].values()), default=None) if name in fit else None
         for name in ('nominal', 'augmented')
     ]
-    names = [Name(e.id, e.joint, e.alternatives, _strength(e), is_wide(e)) for e in case.effects]
-    names += [Name(NUMBERS, joint, rivals, '') for joint, rivals in _beside_numbers(case).items()]
+    names = [
+        Name(e.id, e.joint, e.alternatives, _strength(e), is_wide(e), _open(e.left_open))
+        for e in case.effects
+    ]
+    names += [
+        Name(OTHER_NUMBERS, joint, rivals, '', left_open=_open(case.explanation.left_open(joint)))
+        for joint, rivals in _beside_numbers(case).items()
+    ]
     sentence = verdict_sentence(case)
     places = tuple(where(place) for place in case.places)
     return Answer(str(case.verdict), sentence, tuple(names), worst[0], worst[1], seconds, places)
+
+
+def _open(left: Posterior) -> str:
+    return in_words(left) if left else ''
 
 
 def _strength(effect: NamedEffect) -> str:

@@ -52,6 +52,7 @@ class Name:
     rivals: tuple[str, ...]  # that the recordings do not tell from it, nearest first
     strength: str  # its first number with its 90 % interval, in words
     wide: bool = False  # whether that is known by no more than its order of magnitude
+    left_open: str = ''  # the names that hold the truth with 90 %, with their probabilities
 
 
 @dataclass(frozen=True)
@@ -287,7 +288,8 @@ def answered(answer: Answer) -> Sequence[str]:
         others = ' or '.join(name.rivals)
         told = f'not told from {others}' if others else 'told from all others'
         strength = f', {name.strength}' if name.strength else ''
-        lines.append(f'{name.id} of {name.joint}{strength}: {told}.')
+        chances = f'; likely are {name.left_open}' if name.left_open else ''
+        lines.append(f'{name.id} of {name.joint}{strength}: {told}{chances}.')
     lines += [f'Where: {place}.' for place in answer.places]
     if answer.described is not None and answer.improved is not None:
         lines.append(

@@ -22,7 +22,7 @@ from endoscope_pages import Curve, Plot, figure_html, html_table, render_page
 
 COLOURS = ('actual', 'wanted')
 """Of the curves of the joints, names of look.css."""
-COLUMNS = ('effect', 'joint', 'not told from', 'strength, 90 % interval')
+COLUMNS = ('effect', 'joint', 'left open, with probability', 'strength, 90 % interval')
 
 
 def page(log: Log, folder: Path) -> str:
@@ -57,7 +57,7 @@ def page(log: Log, folder: Path) -> str:
 
 def _names(answer: Answer) -> str:
     rows = [
-        (name.id, name.joint, ', '.join(name.rivals) or 'none', name.strength)
+        (name.id, name.joint, name.left_open or ', '.join(name.rivals) or 'none', name.strength)
         for name in answer.names
     ]
     return html_table(COLUMNS, rows, words=len(COLUMNS))
