@@ -6,7 +6,6 @@ import pytest
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.rig import shipped_rig
 from endoscope_explain.design import (
-    NUMBERS,
     imagine,
     is_safe,
     left_over,
@@ -15,6 +14,7 @@ from endoscope_explain.design import (
 )
 from endoscope_explain.experiment_motions import family
 from endoscope_explain.explanation import NamedEffect
+from endoscope_explain.prediction_set import OTHER_NUMBERS
 
 PLANT = PlantDescription()
 RIVALLED = NamedEffect('transport_delay', 'bend_x', {}, ('actuator_lag',))
@@ -100,6 +100,6 @@ def test_other_numbers_are_a_rival_of_an_effect(record):
     joint = dataclasses.replace(PLANT.joints['bend_x'], joint_friction=0.02)
     others = dataclasses.replace(PLANT, joints={**PLANT.joints, 'bend_x': joint})
     proposed = propose_beside_numbers(recording, others, PLANT, 'bend_x', ('transport_delay',))
-    assert proposed.separates == (NUMBERS, 'transport_delay')
+    assert proposed.separates == (OTHER_NUMBERS, 'transport_delay')
     # A function at a place has no formula to simulate it by.
     assert propose_beside_numbers(recording, others, PLANT, 'bend_x', ('load_of_angle',)) is None
