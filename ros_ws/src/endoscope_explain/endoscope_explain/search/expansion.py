@@ -167,34 +167,46 @@ Trial = tuple[TrialFit | None, ...]
 """A term's first fit to each recording; None where that has no use for it."""
 
 
-def expanded(screen: Screened, jobs: int) -> tuple[list[Candidate], list[Trial]]:
-    """The parent with one term more, the best first, and trials that were not worth a full fit."""
+def expanded(screen: Screened, jobs: int) -> list[Candidate]:
+    """The parent with one term more, the best first."""
     parent = screen.parent.candidate
-    trials = _trials(screen, jobs)
-    chosen = _worth_a_fit(trials, screen.known)
+    chosen = _worth_a_fit(_trials(screen, _likely_terms(screen, jobs), jobs), screen.known)
     grown = parallel_map(lambda seen: refit(seen, parent), chosen, jobs)
     grown.sort(key=lambda c: -c.evidence)
     if grown and not grown[0].is_noise and len(parent.fits) == 1:
         grown = _with_finer_functions(grown, screen, jobs)
         grown = _with_their_formulas(grown, screen, jobs)
-    tried = {id(each) for each in chosen}
-    return _settled(grown, jobs), [seen for _, seen in trials if id(seen) not in tried]
+    return _settled(grown, jobs)
 
 
-def of_each_stage(parent: Candidate, trials: list[Trial], jobs: int) -> list[Candidate]:
-    """The best trials, first ones first, of each part of the chain, fitted until they stand."""
-    formulas = [seen for seen in trials if not term_of(seen).is_function]
-    chosen = first_of_each(formulas, lambda seen: term_of(seen).effect.stage)
-    return parallel_map(lambda seen: converged(refit(seen, parent)), chosen, jobs)
+def before_giving_up(screen: Screened, found: Sequence[Candidate], jobs: int) -> list[Candidate]:
+    """The formulas that the screen puts first, of all and of each part of the chain."""
+    # Beside numbers that are bent by what is missing, a first fit of few simulations may lead
+    # nowhere where a full one finds what the screen has seen.
+    parent = screen.parent.candidate
+    there = {each.terms[-1].variant for each in found if each.terms}
+    likely = []
+    for behind, ways in zip(screen.behind, screen.ways, strict=True):
+        ranked = [term for term in screened(behind, ways) if not term.is_function]
+        variants = by_variant(ranked)
+        first = variants[:REFITTED] + first_of_each(variants, lambda own: own[0].effect.stage)
+        chosen = first_of_each(first, lambda own: own[0].variant)
+        likely.append([t for own in chosen for t in own[:STARTS] if t.variant not in there])
+    new = [seen for _, seen in _trials(screen, likely, jobs)]
+    return parallel_map(lambda seen: converged(refit(seen, parent)), new, jobs)
 
 
-def _trials(screen: Screened, jobs: int) -> list[tuple[float, Trial]]:
-    """First fits of the likely terms, with the sum of the logarithms of their costs, best first."""
-    references = screen.parent.references
-    likely = [
+def _likely_terms(screen: Screened, jobs: int) -> list[list[Term]]:
+    """Terms that are worth a first fit, of each recording."""
+    return [
         _likely(*each, screen.known, jobs)
-        for each in zip(screen.behind, screen.ways, references, strict=True)
+        for each in zip(screen.behind, screen.ways, screen.parent.references, strict=True)
     ]
+
+
+def _trials(screen: Screened, likely: list[list[Term]], jobs: int) -> list[tuple[float, Trial]]:
+    """First fits of likely terms, with the sum of the logarithms of their costs, best first."""
+    references = screen.parent.references
     if len(likely) > 1:
         # What one recording makes likely is tried in all of them.
         likely = [_with_those_of(likely, *own) for own in zip(likely, screen.ways, strict=True)]
@@ -318,11 +330,6 @@ def _best_screened(ranked: list[Term]) -> list[Term]:
         for term in terms
         if not term.is_function and any(term.shares_place(each) for each in functions)
     ]
-    # Functions of states crowd out what acts elsewhere: each part of the chain has its best formula
-    # tried.
-    formulas = [own for own in variants if not own[0].is_function]
-    of_stages = first_of_each(formulas, lambda own: own[0].effect.stage)
-    chosen += [t for own in of_stages for t in own[:STARTS] if t not in chosen]
     chosen += [t for own in variants for t in own if t.is_nominal and t not in chosen]
     return chosen
 

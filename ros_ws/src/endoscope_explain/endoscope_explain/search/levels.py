@@ -20,9 +20,9 @@ from endoscope_explain.fit.nominal import is_at_tolerance, with_any_numbers
 from endoscope_explain.search.expansion import (
     Parent,
     Screened,
+    before_giving_up,
     expanded,
     first_of_each,
-    of_each_stage,
     screen_terms,
 )
 from endoscope_explain.search.judging import (
@@ -231,8 +231,7 @@ def _level(
 ) -> Level:
     first = parents[0].candidate
     screens = [screen_terms(parent, jobs, left_out, known) for parent in parents]
-    grown = [expanded(screen, jobs) for screen in screens]
-    found = [each for own, _ in grown for each in own]
+    found = [each for screen in screens for each in expanded(screen, jobs)]
     found += [
         converged(candidate(parent.candidate.terms, *map(with_any_numbers, parent.candidate.fits)))
         for parent in parents
@@ -241,8 +240,7 @@ def _level(
     level = _judged(first, found, screens[0], jobs)
     if level.is_found or (level.found and level.found[0].is_noise):
         return level
-    # Before anything is given up, the best of each part of the chain gets a full fit.
-    more = of_each_stage(first, grown[0][1], jobs)
+    more = before_giving_up(screens[0], found, jobs)
     if all(each.evidence < level.found[0].evidence for each in more):
         return replace(level, found=_ranked([*level.found, *more]))
     return _judged(first, [*found, *more], screens[0], jobs)
