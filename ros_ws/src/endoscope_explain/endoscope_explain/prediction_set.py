@@ -5,9 +5,8 @@ it, and a law of slightly another form moves it by hundreds of nats all the same
 read at a temperature, as is right where no model is (Grunwald, van Ommen, Bayesian Analysis 12,
 2017), and beside the names stand two more hypotheses: that nothing is missing, and that it is
 something that was not tried. What the temperature is in a recording like this one, how likely these
-two are, and from which probability on a name must be said so that the set holds the truth as often
-as it says (Sadinle, Lei, Wasserman, J. Am. Stat. Assoc. 114, 2019) was measured on rigs whose truth
-is known.
+two are, and how far a set must go so that it holds the truth as often as it says (Romano, Sesia,
+Candes, NeurIPS 2020) was measured on rigs whose truth is known.
 """
 
 import math
@@ -19,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import softmax
 
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_explain.criteria import LEAST_PROBABILITY, NAME_OF_FUNCTION, POSTERIOR
+from endoscope_explain.criteria import MASS, NAME_OF_FUNCTION, POSTERIOR
 
 Array = NDArray[np.float64]
 
@@ -65,9 +64,13 @@ class Contest:
 
     def left_open(self, said: str) -> Posterior:
         """The part of it that holds the truth with 90 %, what is said of it in any case."""
-        least = LEAST_PROBABILITY[self.beyond_form > 0.0]
-        every = self.posterior().items()
-        return {names: p for names, p in every if p >= least or said in names}
+        left: Posterior = {}
+        before = 0.0
+        for names, p in self.posterior().items():
+            if before <= MASS or said in names:
+                left[names] = p
+            before += p
+        return left
 
     def probability(
         self, said: str, weights: Sequence[float] = POSTERIOR, of_function: float = NAME_OF_FUNCTION

@@ -41,18 +41,22 @@ def test_where_form_is_worth_more_evidence_tells_less():
 
 
 def test_what_is_said_is_in_the_set_however_unlikely(monkeypatch):
-    monkeypatch.setattr(prediction_set, 'LEAST_PROBABILITY', (1.1, 1.1))
+    monkeypatch.setattr(prediction_set, 'MASS', -1.0)
     assert set(NEAR.left_open('contact')) == {('joint_stop', 'contact')}
     assert set(WEAK.left_open(NOTHING)) == {(NOTHING,)}
 
 
-def test_a_lower_limit_leaves_no_smaller_set(monkeypatch):
+def test_a_set_takes_the_likeliest_names_and_goes_further_where_they_are_less_likely(monkeypatch):
     sizes = []
-    for least in np.geomspace(1.0, 1e-9, 20):
-        monkeypatch.setattr(prediction_set, 'LEAST_PROBABILITY', (least, least))
-        sizes.append(len(NEAR.left_open('gravity')))
+    for mass in np.linspace(0.0, 1.0, 20):
+        monkeypatch.setattr(prediction_set, 'MASS', mass)
+        left = NEAR.left_open('gravity')
+        assert list(left) == list(NEAR.posterior())[: len(left)]
+        sizes.append(len(left))
     assert sizes == sorted(sizes)
     assert (sizes[0], sizes[-1]) == (1, 4)
+    monkeypatch.setattr(prediction_set, 'MASS', 0.6)
+    assert (len(FAR.left_open('gravity')), len(NEAR.left_open('gravity'))) == (1, 2)
 
 
 def test_alternatives_are_names_alone():

@@ -78,7 +78,7 @@ def test_what_names_leave_over_and_what_differs_besides_is_said_under_the_headli
 
 
 def test_names_that_are_left_open_are_said_with_their_probabilities(stribeck_case, monkeypatch):
-    monkeypatch.setattr(prediction_set, 'LEAST_PROBABILITY', (0.1, 0.1))
+    monkeypatch.setattr(prediction_set, 'MASS', 0.7)
     monkeypatch.setattr(Contest, 'probabilities', lambda _: np.array([0.6, 0.3, 0.02, 0.08]))
     names = (('stribeck_friction',), ('exponent_of_speed', 'viscous_friction'))
     tried = Contest(names, (90.0, 80.0), 5.0, found=True)

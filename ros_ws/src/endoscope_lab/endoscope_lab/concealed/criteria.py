@@ -64,7 +64,7 @@ class Criteria:
     BEYOND_FORM: float
     INTERVAL_WIDTH: float
     POSTERIOR: tuple[float, ...]
-    LEAST_PROBABILITY: tuple[float, float]
+    MASS: float
     NAME_OF_FUNCTION: float
 
 
@@ -94,19 +94,12 @@ def bank_of(rows: Sequence[Row]) -> Bank:
 
 def derived(bank: Bank) -> Criteria:
     """Criteria from a bank of cases; ValueError if it has too few for the quantiles."""
-    # The limit is of names that other cases' weights make as likely: of its own ones it would be
-    # too high.
-    given = _crossed(bank)
-    least = [
-        -conformal(-np.array([p for c, p in given if (c.contest.beyond_form > 0.0) == left]), HOLDS)
-        for left in (False, True)
-    ]
     return Criteria(
         # What no more than another form leaves is adequate, whatever right explanations leave.
         max(conformal(bank.beyond[bank.exact], ADEQUATE), 1.0),
         conformal(bank.errors, HOLDS),
         _likeliest(bank.contests),
-        (max(least[0], 0.0), max(least[1], 0.0)),
+        conformal(_before_truth(bank), HOLDS),
         _name_of_function(bank.contests),
     )
 
@@ -117,19 +110,21 @@ def _name_of_function(contests: Sequence[JudgedContest]) -> float:
     return (1.0 + sum(named)) / (2.0 + len(named))
 
 
-def _crossed(bank: Bank) -> list[tuple[JudgedContest, float]]:
-    """Contests, and how likely what is right of each is by the cases of the other parts."""
-    # What is said is in every set.
+def _before_truth(bank: Bank) -> Array:
+    """Probability (m,) of all that is likelier than the truth, by the cases of the other parts."""
+    # By its own cases' weights it would seem to be less.
     found = []
     for part in range(PARTS):
         own = bank.case % PARTS == part
         weights = _likeliest([c for c, mine in zip(bank.contests, own, strict=True) if not mine])
-        for contest, mine in zip(bank.contests, own, strict=True):
+        for each, mine in zip(bank.contests, own, strict=True):
             if mine:
-                chances = contest.contest.probabilities(weights)[np.array(contest.right)]
-                right = 1.0 if contest.said_is_right else float(np.max(chances, initial=0.0))
-                found.append((contest, right))
-    return found
+                chances = each.contest.probabilities(weights)
+                right = float(np.max(chances[np.array(each.right)], initial=0.0))
+                above = float(np.sum(chances[chances > right]))
+                # What is said is in every set.
+                found.append(0.0 if each.said_is_right else above)
+    return np.array(found)
 
 
 def _likeliest(contests: Sequence[JudgedContest]) -> tuple[float, ...]:
@@ -238,8 +233,8 @@ POSTERIOR = ({', '.join(f'{weight:.3g}' for weight in criteria.POSTERIOR)})
 largest gain, of what form is worth, and of what is left over what another form leaves. Then of the
 odds of nothing: of one, and of whether something is said to be missing. Then of those of something
 else: of one, and of what is left."""
-LEAST_PROBABILITY = ({', '.join(f'{least:.3g}' for least in criteria.LEAST_PROBABILITY)})
-"""Of what a set holds, where noise alone is left and where more is."""
+MASS = {criteria.MASS:.3g}
+"""Probability of the likeliest names up to which a set takes one more."""
 NAME_OF_FUNCTION = {criteria.NAME_OF_FUNCTION:.3g}
 """Chance that a function is a form of the effect whose formula comes nearest at its place."""
 '''
