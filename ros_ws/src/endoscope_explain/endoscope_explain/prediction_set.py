@@ -51,8 +51,9 @@ class Contest:
         names, gains = tuple(n for n, _ in left), tuple(g for _, g in left)
         return replace(self, names=names, gains=gains)
 
-    def probabilities(self, weights: Sequence[float] = POSTERIOR) -> Array:
+    def probabilities(self, weights: Sequence[float] | None = None) -> Array:
         """Probability (k + 2,) of each of the names, of nothing, and of something else."""
+        weights = POSTERIOR if weights is None else weights
         odds = log_odds([self.gains], [self.form], [self.found], [self.beyond_form], weights)
         return np.asarray(softmax(odds[0]))
 
@@ -73,7 +74,10 @@ class Contest:
         return left
 
     def probability(
-        self, said: str, weights: Sequence[float] = POSTERIOR, of_function: float = NAME_OF_FUNCTION
+        self,
+        said: str,
+        weights: Sequence[float] | None = None,
+        of_function: float = NAME_OF_FUNCTION,
     ) -> float:
         """Probability of what is said."""
         # A function at a place is mostly a form of the effect whose formula comes nearest.
@@ -104,8 +108,8 @@ def log_odds(
     of = np.stack([np.ones_like(top), np.log1p(top), np.log1p(np.maximum(form, 0.0)), left])
     temperature = np.exp(np.clip(w[:4] @ of, math.log(_COLDEST), math.log(_HOTTEST)))
     names = (gained - top[:, None]) / temperature[:, None]
-    nothing = -top / temperature + w[4] + w[5] * np.array(found)
-    return np.column_stack([names, nothing, w[6] + w[7] * left])
+    nothing = w[4] + w[5] * np.array(found) + w[6] * np.log1p(top)
+    return np.column_stack([names, nothing, w[7] + w[8] * left])
 
 
 def alternatives(left: Posterior, said: str) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from endoscope_core.physics.simulator import TICK
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import hold, move, sequence
 from endoscope_core.signals.command_file import JOINTS, CommandTable, read_command_file
+from endoscope_explain import prediction_set
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.explanation import Verdict
 from endoscope_explain.investigation import page
@@ -216,7 +217,8 @@ def test_names_that_were_given_or_left_open_are_known_to_the_next_explanation(bo
     assert known_then == [{}, {'bend_x': {'stribeck_friction', 'viscous_friction'}}]
 
 
-def test_numbers_that_an_effect_may_stand_for_are_asked_about(both, told):
+def test_numbers_that_an_effect_may_stand_for_are_asked_about(both, told, monkeypatch):
+    monkeypatch.setattr(prediction_set, 'MASS', 1.0)
     tried = Contest((('other numbers',), ('gravity', 'load_of_angle')), (9.0, 9.0), 5.0, False)
     found = {'effects': (), 'verdict': Verdict.PARAMETERS_DIFFER}
     explanation = dataclasses.replace(told.explanation, contests={'bend_x': tried}, **found)

@@ -13,7 +13,6 @@ from scipy.special import logsumexp
 
 from endoscope_core.atomic_output import write_text
 from endoscope_core.errors import EndoscopeError
-from endoscope_explain.criteria import POSTERIOR
 from endoscope_explain.prediction_set import log_odds
 from endoscope_lab.concealed.row import Row
 from endoscope_lab.concealed.sets import JudgedContest
@@ -50,7 +49,7 @@ HOLDS = 0.9
 ADEQUATE = 0.95
 """Share of right explanations that are called adequate."""
 PARTS = 10
-PRIOR = np.array([3.0, 1.0, 1.0, 1.0, 3.0, 3.0, 3.0, 3.0])
+PRIOR = np.array([3.0, 1.0, 1.0, 1.0, 3.0, 3.0, 1.0, 3.0, 3.0])
 """Standard deviations of the weights before anything is known: evidence in nats goes with no more
 than a power of one of anything, and odds are e to a few."""
 LEAST = 1e-6
@@ -148,7 +147,7 @@ def _likeliest(contests: Sequence[JudgedContest]) -> tuple[float, ...]:
         bounded = np.logaddexp(likely, math.log(LEAST))
         return 0.5 * float(np.sum((weights / PRIOR) ** 2)) - float(np.sum(bounded))
 
-    found_at = minimize(cost, np.array(POSTERIOR), method='BFGS')
+    found_at = minimize(cost, np.zeros(len(PRIOR)), method='BFGS')
     return tuple(found_at.x.tolist())
 
 
@@ -231,8 +230,8 @@ INTERVAL_WIDTH = {criteria.INTERVAL_WIDTH:.3g}
 POSTERIOR = ({', '.join(f'{weight:.3g}' for weight in criteria.POSTERIOR)})
 """Weights of the logarithm of the temperature of evidence: of one, and of the logarithms of the
 largest gain, of what form is worth, and of what is left over what another form leaves. Then of the
-odds of nothing: of one, and of whether something is said to be missing. Then of those of something
-else: of one, and of what is left."""
+odds of nothing: of one, of whether something is said to be missing, and of the logarithm of the
+largest gain. Then of those of something else: of one, and of what is left."""
 MASS = {criteria.MASS:.3g}
 """Probability of the likeliest names up to which a set takes one more."""
 NAME_OF_FUNCTION = {criteria.NAME_OF_FUNCTION:.3g}

@@ -12,6 +12,7 @@ from rclpy.task import Future
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from endoscope_core.calibration.calibration_run import CalibrationStep
 from endoscope_core.safety.operating_state import CAUSES_PRESENT
 from endoscope_nodes import names
 from endoscope_nodes.client.graph_listener import (
@@ -26,6 +27,9 @@ from endoscope_nodes.client.order_feedback import CALIBRATE, HOME, OrderFeedback
 from endoscope_nodes.runtime.environment import joined_node
 from endoscope_nodes.runtime.qos import EVENT
 
+COMPUTES_S = 60.0
+"""How long a calibration may be silent once its motion is over: two slow cores that do other work
+besides have taken more than 10 s for class and plant."""
 WHOLE_S = 10.0
 """How long a graph that has just been started may take until all its streams are heard."""
 _OPENS = {'enable': 'ENABLED', 'resume': 'ENABLED', 'disable': 'DISABLED', 'pause': 'PAUSED'}
@@ -219,8 +223,11 @@ class GraphClient(GraphListener):
             return self.order_since(known, name) != heard
 
         while heard is None or heard.state == OrderState.EXECUTING:
-            if not self.wait_until(says_more, patience_s):
-                raise GraphError(f'calibration has been silent for {patience_s:g} s')
+            # Once the motion is over it computes, for as long as a busy machine takes.
+            moves = heard is None or heard.words != CalibrationStep.DONE
+            patience = patience_s if moves else max(patience_s, COMPUTES_S)
+            if not self.wait_until(says_more, patience):
+                raise GraphError(f'calibration has been silent for {patience:g} s')
             heard = self.order_since(known, name)
             if heard is None:
                 raise GraphError(f'calibration has restarted and no longer knows {name}')
