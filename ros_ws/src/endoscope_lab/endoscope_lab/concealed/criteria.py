@@ -3,13 +3,14 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from textwrap import fill
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.special import logsumexp
+from scipy.special import softmax
 
 from endoscope_core.atomic_output import write_text
 from endoscope_core.errors import EndoscopeError
@@ -77,6 +78,23 @@ class Bank:
     contests: tuple[JudgedContest, ...]
     case: NDArray[np.int64]  # (m,), number of each contest's case
 
+    @cached_property
+    def crossed(self) -> list[tuple[JudgedContest, tuple[float, ...], float]]:
+        """Each contest with the weights, and the chance of a function's name, of other cases."""
+        # By its own case's weights, what is right would seem likelier than it is. Cases are left
+        # out by tenths.
+        found = []
+        for part in range(PARTS):
+            own = self.case % PARTS == part
+            others = [c for c, mine in zip(self.contests, own, strict=True) if not mine]
+            weights, of_function = _likeliest(others), _name_of_function(others)
+            found += [
+                (c, weights, of_function)
+                for c, mine in zip(self.contests, own, strict=True)
+                if mine
+            ]
+        return found
+
 
 def bank_of(rows: Sequence[Row]) -> Bank:
     left = [row for row in rows if math.isfinite(row.beyond_form)]
@@ -110,19 +128,14 @@ def _name_of_function(contests: Sequence[JudgedContest]) -> float:
 
 
 def _before_truth(bank: Bank) -> Array:
-    """Probability (m,) of all that is likelier than the truth, by the cases of the other parts."""
-    # By its own cases' weights it would seem to be less.
+    """Probability (m,) of all that is likelier than the truth; nothing is where that is said."""
     found = []
-    for part in range(PARTS):
-        own = bank.case % PARTS == part
-        weights = _likeliest([c for c, mine in zip(bank.contests, own, strict=True) if not mine])
-        for each, mine in zip(bank.contests, own, strict=True):
-            if mine:
-                chances = each.contest.probabilities(weights)
-                right = float(np.max(chances[np.array(each.right)], initial=0.0))
-                above = float(np.sum(chances[chances > right]))
-                # What is said is in every set.
-                found.append(0.0 if each.said_is_right else above)
+    for each, weights, _ in bank.crossed:
+        chances = each.contest.probabilities(weights)
+        right = float(np.max(chances[np.array(each.right)], initial=0.0))
+        above = float(np.sum(chances[chances > right]))
+        # What is said is in every set.
+        found.append(0.0 if each.said_is_right else above)
     return np.array(found)
 
 
@@ -143,9 +156,8 @@ def _likeliest(contests: Sequence[JudgedContest]) -> tuple[float, ...]:
 
     def cost(weights: Array) -> float:
         odds = log_odds(gains, form, found, beyond, weights.tolist())
-        likely = logsumexp(odds, axis=1, b=right) - logsumexp(odds, axis=1)
-        bounded = np.logaddexp(likely, math.log(LEAST))
-        return 0.5 * float(np.sum((weights / PRIOR) ** 2)) - float(np.sum(bounded))
+        chances = np.sum(softmax(odds, axis=1), axis=1, where=right)
+        return 0.5 * float(np.sum((weights / PRIOR) ** 2) - 2.0 * np.sum(np.log(chances + LEAST)))
 
     found_at = minimize(cost, np.zeros(len(PRIOR)), method='BFGS')
     return tuple(found_at.x.tolist())
@@ -153,17 +165,9 @@ def _likeliest(contests: Sequence[JudgedContest]) -> tuple[float, ...]:
 
 def reliability(bank: Bank) -> str:
     """How often names are right that were given with some probability, a line for each tenth."""
-    # The probability of a name follows from the other cases, ten parts of them in turn.
-    given, right = [], []
-    for part in range(PARTS):
-        own = bank.case % PARTS == part
-        others = [c for c, mine in zip(bank.contests, own, strict=True) if not mine]
-        weights, of_function = _likeliest(others), _name_of_function(others)
-        for each, mine in zip(bank.contests, own, strict=True):
-            if mine and each.contest.found:
-                given.append(each.contest.probability(each.said, weights, of_function))
-                right.append(each.said_is_right)
-    chances, is_right = np.array(given), np.array(right, dtype=bool)
+    named = [each for each in bank.crossed if each[0].contest.found]
+    chances = np.array([c.contest.probability(c.said, w, share) for c, w, share in named])
+    is_right = np.array([c.said_is_right for c, *_ in named], dtype=bool)
     lines = [f'{"probability":>14s}{"names":>7s}{"mean":>8s}{"right":>8s}']
     for tenth in range(10):
         inside = np.minimum((10.0 * chances).astype(int), 9) == tenth
