@@ -56,7 +56,7 @@ def test_what_is_found_is_located_and_reported_alike_everywhere(corpus, name, tm
 
 def test_an_effect_is_named_below_a_mistake_in_units_and_its_misfit_is_said(corpus):
     case = corpus.case('degrees')
-    assert 'As corrected: The recording shows load_cell_gain' in told(case)
+    assert 'As corrected: The recording shows load_cell_gain on bend_x.' in told(case)
     (mistake,) = case.audit.mistakes()
     assert mistake.evidence['misfit_corrected'] < 0.1 < 0.9 < mistake.evidence['misfit']
     assert '(misfit 100 % as recorded, ' in mistake.text

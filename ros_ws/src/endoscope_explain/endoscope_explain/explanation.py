@@ -14,11 +14,9 @@ from endoscope_core.physics.effects import describe
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.places import Place
 from endoscope_explain.prediction_set import (
-    NOTHING,
     OTHER_NUMBERS,
     Contest,
     Posterior,
-    alternatives,
 )
 
 Array = NDArray[np.float64]
@@ -211,14 +209,12 @@ class Explanation:
     def left_open(self, joint: str) -> Posterior:
         """What may be missing from a joint besides what is named; empty where noise is left."""
         contest = self.contests.get(joint)
-        if contest is None:
-            return {}
-        numbers = any(OTHER_NUMBERS in names for names in contest.names)
-        return contest.left_open(OTHER_NUMBERS if numbers else NOTHING)
+        return {} if contest is None else contest.left_open(contest.nameless)
 
     def instead(self, joint: str) -> tuple[str, ...]:
         """Names of it, the likeliest first."""
-        return alternatives(self.left_open(joint), OTHER_NUMBERS)
+        contest = self.contests.get(joint)
+        return () if contest is None else contest.alternatives(OTHER_NUMBERS)
 
     @staticmethod
     def without_fit(verdict: Verdict, plant: PlantDescription) -> 'Explanation':

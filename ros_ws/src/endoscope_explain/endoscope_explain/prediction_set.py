@@ -73,6 +73,16 @@ class Contest:
             before += p
         return left
 
+    def alternatives(self, said: str) -> tuple[str, ...]:
+        """Names that are left open beside the one that is said, the likeliest first."""
+        names = [name for each in self.left_open(said) for name in each]
+        return tuple(n for n in names if n not in (said, NOTHING, SOMETHING_ELSE))
+
+    @property
+    def nameless(self) -> str:
+        """What is said where no name is: other numbers, if these were tried, or nothing."""
+        return OTHER_NUMBERS if any(OTHER_NUMBERS in n for n in self.names) else NOTHING
+
     def probability(
         self,
         said: str,
@@ -110,9 +120,3 @@ def log_odds(
     names = (gained - top[:, None]) / temperature[:, None]
     nothing = w[4] + w[5] * np.array(found) + w[6] * np.log1p(top)
     return np.column_stack([names, nothing, w[7] + w[8] * left])
-
-
-def alternatives(left: Posterior, said: str) -> tuple[str, ...]:
-    """Names of a set beside the one that is said, the likeliest first."""
-    names = [name for each in left for name in each]
-    return tuple(n for n in names if n not in (said, NOTHING, SOMETHING_ELSE))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from endoscope_explain import prediction_set
-from endoscope_explain.prediction_set import NOTHING, SOMETHING_ELSE, Contest, alternatives
+from endoscope_explain.prediction_set import NOTHING, SOMETHING_ELSE, Contest
 
 NEAR = Contest((('gravity',), ('joint_stop', 'contact')), (120.0, 119.0), 40.0, found=True)
 FAR = Contest((('gravity',), ('joint_stop',)), (12000.0, 300.0), 0.0, found=True, beyond_form=0.0)
@@ -66,9 +66,11 @@ def test_a_set_takes_the_likeliest_names_and_goes_further_where_they_are_less_li
     assert (len(FAR.left_open('gravity')), len(NEAR.left_open('gravity'))) == (1, 2)
 
 
-def test_alternatives_are_names_alone():
-    left = {('gravity', 'joint_stop'): 0.6, (NOTHING,): 0.2, ('contact',): 0.1}
-    assert alternatives(left, 'gravity') == ('joint_stop', 'contact')
+def test_alternatives_are_names_alone(monkeypatch):
+    monkeypatch.setattr(prediction_set, 'MASS', 1.0)
+    assert len(NEAR.left_open('gravity')) == 4
+    assert NEAR.alternatives('gravity') == ('joint_stop', 'contact')
+    assert NEAR.alternatives('contact') == ('gravity', 'joint_stop')
 
 
 def test_what_is_found_besides_is_no_other_name():

@@ -33,7 +33,6 @@ from endoscope_explain.fit.intervals import effect_estimates, nominal_estimates
 from endoscope_explain.fit.model import Fit, joint_of
 from endoscope_explain.fit.solver import Ended
 from endoscope_explain.observe.observation import JointObservation
-from endoscope_explain.prediction_set import alternatives
 from endoscope_explain.search.formula import fitted_function, nearest_formula
 from endoscope_explain.search.levels import JointSearch
 from endoscope_explain.search.refit import Candidate
@@ -94,7 +93,7 @@ def _named(joint: str, decision: Decision, term: MissingTerm) -> NamedEffect:
             definition.first_parameter,
             {p.name: p.unit for p in definition.parameters},
         ),
-        alternatives(tried.left_open(term.name), term.name),
+        tried.alternatives(term.name),
         {
             'gain': term.gain,
             'p_value': term.p_value,
@@ -252,7 +251,7 @@ def missing_function(decisions: list[Decision]) -> UnknownTerm | None:
     return replace(
         unknown_term(decision.chosen, term.term),
         explained=decision.explained,
-        rivals=alternatives(tried.left_open(term.term.id), term.term.id),
+        rivals=tried.alternatives(term.term.id),
         siblings=siblings,
         contest=tried,
     )

@@ -114,7 +114,7 @@ def test_an_effect_is_found_by_its_formula_with_nothing_left(references):
     assert [term.name for term in decision.missing] == [hidden.id]
     fitted = {term.id for each in tried.tried() for term in each.terms}
     assert 'cogging' in fitted, 'what is known from elsewhere is fitted in any case'
-    assert decision.missing[0].contest.names[0] == (hidden.id,)
+    assert decision.missing[0].contest.alternatives(hidden.id) == ()
     assert decision.adequate
     found = decision.chosen.fit
     assert np.sqrt(mean_squares(found.model.observation, found.residuals).max()) < 1.2

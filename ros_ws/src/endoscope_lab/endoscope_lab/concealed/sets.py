@@ -116,8 +116,7 @@ def _contests(said: Explanation) -> Iterator[tuple[str, str, Contest]]:
     if term is not None and not term.siblings and term.contest is not None:
         yield term.place, term.joint, term.contest
     for joint, contest in said.contests.items():
-        numbers = any(OTHER_NUMBERS in names for names in contest.names)
-        yield OTHER_NUMBERS if numbers else NOTHING, joint, contest
+        yield contest.nameless, joint, contest
 
 
 def _right(
