@@ -1,266 +1,329 @@
-"""The motion that separates the rivals of an explanation best.
+"""The short motion that decides most per second between what an answer leaves open.
 
-The smallest distance between any two rivals, each refitted to the other, is maximised over a
-family of safe motions (Hunter, Reiner, Technometrics 7, 1965; Chen, Asprey, Ind. Eng. Chem. Res.
-42, 2003).
+What is left open are laws, each with a probability and with numbers that the recordings know to
+some precision. For every safe motion of a library, the evidence that it is expected to bring for
+the law that is true over each of the others, refitted within that precision, is weighted by their
+probabilities (Box, Hill, Technometrics 9, 1967). The refit is linear (Buzzi-Ferraris, Forzatti,
+Chem. Eng. Sci. 38, 1983). Something that nobody has a name for stands beside them: it shows where a
+motion makes what no recording has made (as with no right model among those compared: Olofsson et
+al., arXiv 2304.07949).
 """
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import permutations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
-from endoscope_core.physics.effects import KNOWN, describe
-from endoscope_core.physics.packing import without_functions
-from endoscope_core.physics.simulator import TICK, simulate
-from endoscope_core.rig import Rig
-from endoscope_core.safety import MotionLimits, MotionShaper
+from endoscope_core.physics.simulator import TICK
 from endoscope_core.signals.command_file import JOINTS
 from endoscope_core.workers import parallel_map
-from endoscope_explain.case import NextExperiment
-from endoscope_explain.decide.conclusions import spec_of
-from endoscope_explain.experiment_motions import SAMPLE_S, Waveform, family
+from endoscope_explain.case import ExplainedCase, NextExperiment
+from endoscope_explain.experiment_motions import SMALLEST, Segment, library
 from endoscope_explain.explanation import NamedEffect
 from endoscope_explain.fit.free_parameters import LEAD, effect_parameters, nominal_parameters
-from endoscope_explain.fit.model import Fit, JointModel, fit, jacobian, joint_of, packed_joint
-from endoscope_explain.observe.observation import JointObservation, observe
-from endoscope_explain.prediction_set import OTHER_NUMBERS
-from endoscope_explain.recording import Recording, Series
-from endoscope_explain.search.screen import background, directions, screened
-from endoscope_explain.search.term import Term, starting_points
+from endoscope_explain.fit.model import JointModel, jacobian, packed_joint
+from endoscope_explain.imagined_motion import answer_to, is_safe
+from endoscope_explain.observe.observation import (
+    JointObservation,
+    commanded,
+    observe,
+    with_held_noise,
+)
+from endoscope_explain.observe.revisits import newly_visited
+from endoscope_explain.open_questions import OpenQuestion, fitted_laws, open_questions
+from endoscope_explain.prediction_set import SOMETHING_ELSE, Contest
+from endoscope_explain.recording import Recording
 
 Array = NDArray[np.float64]
+Played = Collection[tuple[str, str]]
+"""Motions and the joints that they moved."""
 
-SETTLES_S = 1.0
-"""Most that a motion may end later than was asked for, because the rig is slower."""
-
-
-def as_played(time: Array, angle: Array, rig: Rig) -> tuple[Array, Array]:
-    """A motion (N, J) in rad at times (N,) as the console plays it: within a rig's limits."""
-    facts = rig.joints
-    joints = angle.shape[1]
-    shaper = MotionShaper(
-        MotionLimits.either_way(
-            joints, facts.reach, facts.speed, facts.acceleration, facts.entry_step
-        )
-    )
-    ticks = np.arange(time[0], time[-1] + SETTLES_S, TICK)
-    wanted = np.stack([np.interp(ticks, time, column) for column in angle.T], axis=1)
-    shaper.restart(wanted[0])
-    shaped = np.array([shaper.shape(each, TICK) for each in wanted.tolist()])
-    every = round(SAMPLE_S / TICK)
-    return ticks[::every], shaped[::every]
-
-
-MOST_RIVALS = 3
 MARGIN = 1.15
 """How far a proposed motion may go beyond the tensions and angles that were recorded."""
-SURE = 1.96
-"""Standard deviations by which a motion must be expected to tell rivals apart: 97.5 %."""
+LEAST_NATS = 3.0
+"""Evidence in nats, as the posterior reads it, that a motion must be expected to bring: odds of 20
+to 1."""
+DECIDED = math.log(99.0)
+"""Logarithm of the odds at which more evidence decides nothing more."""
 HALVED = 0.5
 """Share of an interval's width that a motion must leave at most to be worth it: the recording made
 once more leaves 0.7."""
+_UNBOUNDED = 1e-6
+"""Precision of a coordinate of which nothing is known: a spread of a thousand."""
 WIDE = 0.25
 """Half width of a strength's 90 % interval, as a share of it, that is worth another motion."""
-NOMINAL_BAND = 0.05
-"""Relative freedom that nominal parameters still have after a first recording."""
-REFIT_STEPS = 3
 
 
-def refit(
-    plant: PlantDescription, observation: JointObservation, band: float, iterations: int
-) -> Fit:
-    """Refit one joint of a plant, its effects included, from where it is."""
-    base, flags = packed_joint(plant, observation.joint)
-    free = nominal_parameters(base, band)
-    for spec in plant.effects:
-        if spec.joint == observation.joint:
-            free += effect_parameters(spec.id)
-    model = JointModel(observation, base, flags, free)
-    start = np.array(
-        [item.coordinate(1.0 if item.index == LEAD else float(base[item.index])) for item in free]
-    )
-    return fit(model, start, iterations=iterations)
-
-
-def with_fit(plant: PlantDescription, joint: str, found: Fit) -> PlantDescription:
-    """Put the fitted numbers of one joint back into a plant."""
-    packed, _ = found.model.packed(found.theta)
-    effects = tuple(
-        spec_of(describe(spec.id), joint, packed) if spec.joint == joint else spec
-        for spec in plant.effects
-    )
-    return replace(plant, joints={**plant.joints, joint: joint_of(packed)}, effects=effects)
-
-
-def left_over(truth: Recording, rival: PlantDescription, joint: str) -> Array:
-    """What a rival misses (size,), in noise, of the other's noise-free answer after its refit."""
-    observation = next(o for o in observe(truth, rival) if o.joint == joint)
-    return refit(rival, observation, NOMINAL_BAND, REFIT_STEPS).residuals
-
-
-def imagine(plant: PlantDescription, waveform: Waveform, rig: Rig) -> Recording:
-    """A plant's noise-free answer to the motion of one joint."""
-    joints = plant.joint_names()
-    desired = np.zeros((len(waveform.time), len(joints)))
-    desired[:, joints.index(waveform.joint)] = waveform.angle
-    return answer_to(plant, waveform.name, waveform.time, desired, rig)
-
-
-def answer_to(plant: PlantDescription, name: str, time: Array, angle: Array, rig: Rig) -> Recording:
-    """A plant's noise-free answer to a motion (N, J) in rad at times (N,)."""
-    # The tracker at its rate, all else every tick.
-    ticks = np.arange(0.0, time[-1], TICK)
-    desired = np.stack([np.interp(ticks, time, column) for column in angle.T], axis=1)
-    shaft = rig.joints.gear * desired
-    answer = simulate(plant, shaft)
-    slow = slice(None, None, max(1, round(1.0 / (plant.sensors.tracker_rate * TICK))))
-    return Recording(
-        name,
-        0.0,
-        plant.joint_names(),
-        Series.of('motor/servo_jp', ticks, shaft),
-        Series.of('wires/measured_js', ticks, answer.tension),
-        Series.of('slave/measured_js', ticks[slow], answer.bending[slow]),
-        Series.of('motor/measured_js', ticks, answer.shaft_position),
-        Series.of('motor/measured_js', ticks, answer.shaft_velocity),
-        Series.of('motor/measured_js', ticks, answer.shaft_effort),
-        rig=rig,
-    )
-
-
-def is_safe(
-    recording: Recording,
-    tension_limit: float,
-    bending_limit: float,
-    slack_limit: float = 0.0,
-) -> bool:
-    """Tell whether an imagined motion stays within tensions in N and an angle in rad."""
-    assert recording.tension is not None
-    return bool(
-        recording.tension.values.max() <= tension_limit
-        and recording.tension.values.min() >= slack_limit
-        and np.abs(recording.bending.values).max() <= bending_limit
-    )
-
-
-Played = Collection[tuple[str, str]]
-"""Waveforms and the joints that they moved."""
+def what_is_asked(case: ExplainedCase) -> list['Asking']:
+    """All that a case leaves open, each law fitted: the most of what a proposal costs."""
+    return [Asking.of(case, question) for question in open_questions(case)]
 
 
 def propose(
-    recording: Recording,
-    plant: PlantDescription,
-    effect: NamedEffect,
-    jobs: int = 1,
-    played: Played = (),
-    left: float = 1.0,
+    case: ExplainedCase, asked: Sequence['Asking'], jobs: int = 1, played: Played = ()
 ) -> NextExperiment | None:
-    """Propose the motion that tells an effect, which `plant` has, from its alternatives.
+    """Propose the motion that decides most per second of what is asked about a case.
 
-    None where there is no rival, or where no safe motion, but those that were played, is expected
-    to show more than an error of form may. What the plant leaves of a recording, in its noise
-    (rms), weighs against what a motion shows.
+    Where nothing but a strength is open, the motion that narrows its interval. None where nothing
+    is, or where no safe motion, but those that were played, is expected to show enough.
     """
-    plants = {effect.id: plant} | {
-        rival: fitted
-        for rival in effect.alternatives[: MOST_RIVALS - 1]
-        if (fitted := rival_plant(recording, plant, effect, rival)) is not None
-    }
-    form = effect.evidence.get('form', 0.0)
-    return _separating(recording, plants, effect.joint, jobs, played, left, form)
+    found = [best for each in asked if (best := each.best(jobs, played)) is not None]
+    if found:
+        return max(found, key=lambda each: each.per_second).experiment()
+    there = {(spec.id, spec.joint) for spec in case.explanation.augmented.effects}
+    for effect in filter(is_wide, case.effects):
+        if (effect.id, effect.joint) in there:
+            narrowing = narrow(case, effect, jobs, played)
+            if narrowing is not None:
+                return narrowing
+    return None
 
 
-def propose_beside_numbers(
-    recording: Recording,
-    plant: PlantDescription,
-    described: PlantDescription,
-    joint: str,
-    effects: Sequence[str],
-    jobs: int = 1,
-    played: Played = (),
-    left: float = 1.0,
-) -> NextExperiment | None:
-    """Propose the motion that tells other numbers of a joint, which `plant` has, from effects.
+@dataclass(frozen=True)
+class _Law:
+    """A law that is left open, and how well the recordings know its numbers."""
 
-    With an effect the joint has about the numbers that were `described`. None as in `propose`.
-    """
-    bare = replace(plant, joints={**plant.joints, joint: described.joints[joint]})
-    there = {e.id for e in plant.effects if e.joint == joint}
-    rivals = [e for e in effects if e in KNOWN and e not in there]
-    plants = {OTHER_NUMBERS: plant} | {
-        rival: fitted
-        for rival in rivals[: MOST_RIVALS - 1]
-        if (fitted := _with_effect(recording, bare, joint, rival)) is not None
-    }
-    return _separating(recording, plants, joint, jobs, played, left)
+    plant: PlantDescription
+    model: JointModel  # of one joint, on the recordings
+    precision: Array  # (n, n), of its free numbers' coordinates
 
+    @property
+    def noise(self) -> dict[str, float]:
+        """Noise (rms) of the recordings by signal, in its unit."""
+        channels = self.model.observation.channels
+        return {c.signal: float(np.sqrt(np.mean(c.noise**2))) for c in channels}
 
-def _separating(
-    recording: Recording,
-    plants: Mapping[str, PlantDescription],
-    joint: str,
-    jobs: int,
-    played: Played,
-    left: float,
-    form: float = 0.0,
-) -> NextExperiment | None:
-    """The motion of a joint that separates plants best, by their names; None as in `propose`."""
-    if len(plants) < 2:
-        return None
-    motions = [
-        motion
-        for motion in safe_family(recording, list(plants.values()), joint)
-        if (motion.name, motion.joint) not in played
-    ]
-    if not motions:
-        return None
+    @property
+    def theta(self) -> Array:
+        """Coordinates (n,) of its numbers."""
+        base = self.model.base
+        free = self.model.free
+        return np.array(
+            [i.coordinate(1.0 if i.index == LEAD else float(base[i.index])) for i in free]
+        )
 
-    def smallest(waveform: Waveform) -> tuple[float, float]:
-        imagined = {name: imagine(p, waveform, recording.rig) for name, p in plants.items()}
-        if recording.tension is None:
-            imagined = {name: replace(r, tension=None) for name, r in imagined.items()}
-        missed = [left_over(imagined[a], plants[b], joint) for a, b in permutations(plants, 2)]
-        nats = min(0.5 * float(np.sum(each**2)) for each in missed)
-        return min(float(np.sqrt(np.mean(each**2))) for each in missed), nats
+    def once(self, changed: Callable[[PlantDescription], PlantDescription], unknown: str) -> '_Law':
+        """The law of a rig that was changed, of which one number is not known any more."""
+        plant = changed(self.plant)
+        base, flags = packed_joint(plant, self.model.observation.joint)
+        free, known = self.model.free, self.precision.copy()
+        for k, item in enumerate(free):
+            if item.name == unknown:
+                known[k, :] = known[:, k] = 0.0
+                known[k, k] = self.model.prior_weight()[k] ** 2 + _UNBOUNDED
+        return replace(
+            self, plant=plant, model=replace(self.model, base=base, flags=flags), precision=known
+        )
 
-    found = parallel_map(smallest, motions, jobs)
-    best = int(np.argmax([apart for apart, _ in found]))
-    apart, nats = found[best]
-    if not tells_apart(nats / max(left, 1.0) ** 2, form):
-        return None
-    rivals = ' and '.join(plants)
-    return _experiment(
-        motions[best],
-        f'{motions[best].name.capitalize()} of {motions[best].joint} would tell {rivals} apart. '
-        f'Each refitted to the other, they still differ by {apart:.1f} times the noise at least.',
-        tuple(plants),
-        {m.name: d for m, (d, _) in zip(motions, found, strict=True)},
-    )
+    def slopes(self, observation: JointObservation) -> Array:
+        """Derivatives (size, n) of what it reads in another motion, in noise units."""
+        return jacobian(replace(self.model, observation=observation), self.theta)
 
 
-def tells_apart(nats: float, form: float) -> bool:
-    """Whether evidence of so many nats is expected to stand out from noise and errors of form."""
-    # Evidence of x nats between two laws scatters by the root of 2 x (Cox, J. R. Stat. Soc. B 24,
-    # 1962).
-    return nats - SURE * np.sqrt(2.0 * nats) > form
+def _law(recording: Recording, plant: PlantDescription, joint: str) -> _Law:
+    base, flags = packed_joint(plant, joint)
+    free = nominal_parameters(base)
+    for spec in plant.effects:
+        if spec.joint == joint:
+            free += effect_parameters(spec.id)
+    seen = next(o for o in with_held_noise(observe(recording, plant)) if o.joint == joint)
+    law = _Law(plant, JointModel(seen, base, flags, free), np.empty((0, 0)))
+    slopes = law.slopes(seen)
+    prior = np.diag(law.model.prior_weight() ** 2 + _UNBOUNDED)
+    return replace(law, precision=slopes.T @ slopes + prior)
+
+
+@dataclass(frozen=True)
+class BestMotion:
+    """A motion, and what it is expected to bring."""
+
+    question: OpenQuestion
+    joints: tuple[str, ...]  # of the rig
+    segment: Segment
+    nats: float
+    per_second: float  # nats up to what decides
+    distances: Mapping[str, float]  # of all motions that were looked at closely
+
+    def experiment(self) -> NextExperiment:
+        """As a report has it."""
+        joint, names = self.segment.joint, [n for n in self.question.chances if n != SOMETHING_ELSE]
+        what = ' from '.join(names) if len(names) > 1 else f'{names[0]} from what has no name'
+        why = (
+            f'{self.segment.name.capitalize()} of {joint}, {self.segment.duration:.0f} s, is '
+            f'expected to distinguish {what} by {self.nats:.0f} nats.'
+        )
+        return _experiment(
+            self.segment, self.joints, why, tuple(self.question.chances), self.distances
+        )
+
+
+@dataclass(frozen=True)
+class Asking:
+    """A question, and what is needed to judge a motion by it."""
+
+    recording: Recording
+    question: OpenQuestion
+    laws: Mapping[str, _Law]
+    noise: Mapping[str, float] = field(repr=False)  # of the recordings (rms), by signal
+
+    @staticmethod
+    def of(case: ExplainedCase, question: OpenQuestion) -> 'Asking':
+        """A question of a case, its laws fitted."""
+        laws = {
+            name: _law(case.recording, plant, question.joint)
+            for name, plant in fitted_laws(case, question).items()
+        }
+        noise = next(iter(laws.values())).noise if laws else {}
+        # What could not be simulated has no name as far as motions go.
+        chances = {n: p for n, p in question.chances.items() if n in laws}
+        unnamed = sum(p for n, p in question.chances.items() if n not in laws)
+        if unnamed > 0.0:
+            chances[SOMETHING_ELSE] = unnamed
+        return Asking(case.recording, replace(question, chances=chances), laws, noise)
+
+    def once(
+        self, changed: Callable[[PlantDescription], PlantDescription], unknown: str = ''
+    ) -> 'Asking':
+        """The same on a rig that was changed in a known way, but for one number of it."""
+        laws = {name: law.once(changed, unknown) for name, law in self.laws.items()}
+        return replace(self, laws=laws)
+
+    def best(self, jobs: int, played: Played) -> BestMotion | None:
+        """The motion that is expected to decide most per second; None where none brings enough."""
+        question = self.question
+        if not self.laws or len(question.chances) < 2:
+            return None
+        motions = [
+            segment
+            for segment in _within(self.recording, question.joint)
+            if (segment.name, segment.joint) not in played
+        ]
+        seen = parallel_map(self.seen, motions, jobs)
+        # Refitting a law brings it nearer: what is apart before is more than what is apart after.
+        rough = [
+            (question.brings(self._apart(*each), each[0].duration, DECIDED)[1], *each)
+            for each in seen
+            if each[1]
+        ]
+        best: BestMotion | None = None
+        distances: dict[str, float] = {}
+        for most, segment, answers in sorted(rough, key=lambda each: -each[0]):
+            if best is not None and most <= best.per_second:
+                break
+            apart = self._apart(segment, answers, refitted=True)
+            distances[segment.name] = _rms(apart, answers)
+            nats, per_second = question.brings(apart, segment.duration, DECIDED)
+            if nats >= LEAST_NATS and (best is None or per_second > best.per_second):
+                best = BestMotion(question, self.recording.joints, segment, nats, per_second, {})
+        return None if best is None else replace(best, distances=distances)
+
+    def seen(self, full: Segment) -> tuple[Segment, dict[str, JointObservation]]:
+        """A motion as large as is safe by all laws, and what each reads; empty where none is."""
+        limits = _limits(self.recording)
+        size = 1.0
+        while size >= SMALLEST:
+            segment = replace(full, angle=size * full.angle)
+            answers = {}
+            for name, law in self.laws.items():
+                plant = law.plant
+                imagined = answer_to(
+                    plant, segment.name, segment.time, segment.angle, self.recording.rig
+                )
+                if not is_safe(imagined, *limits):
+                    break
+                answers[name] = self._observed(imagined, plant)
+            else:
+                return segment, answers
+            size *= 0.7
+        return full, {}
+
+    def _observed(self, imagined: Recording, plant: PlantDescription) -> JointObservation:
+        """What a joint reads in an imagined motion, with the noise of the recordings."""
+        if self.recording.tension is None:
+            imagined = replace(imagined, tension=None)
+        own = next(o for o in observe(imagined, plant) if o.joint == self.question.joint)
+        channels = tuple(
+            replace(c, noise=np.full_like(c.noise, self.noise[c.signal]))
+            for c in own.channels
+            if c.signal in self.noise
+        )
+        return replace(own, channels=channels)
+
+    def _apart(
+        self, segment: Segment, answers: Mapping[str, JointObservation], *, refitted: bool = False
+    ) -> dict[tuple[str, str], float]:
+        """Evidence in nats for each law, if it is true, over each of the others."""
+        apart: dict[tuple[str, str], float] = {}
+        slopes = {n: self.laws[n].slopes(answers[n]) for n in self.laws if refitted}
+        read = {
+            n: np.concatenate([c.value / c.noise for c in o.channels]) for n, o in answers.items()
+        }
+        for true, other in permutations(self.laws, 2):
+            missed = read[other] - read[true]
+            squares = float(missed @ missed)
+            if refitted:
+                towards = slopes[other].T @ missed
+                curvature = slopes[other].T @ slopes[other] + self.laws[other].precision
+                squares -= float(towards @ np.linalg.solve(curvature, towards))
+            apart[true, other] = 0.5 * max(0.0, squares)
+        if SOMETHING_ELSE in self.question.chances:
+            shown = self._newly_visited(segment) * self.question.decides(segment.duration, DECIDED)
+            for name in self.laws:
+                apart[name, SOMETHING_ELSE] = apart[SOMETHING_ELSE, name] = shown
+        return apart
+
+    def _newly_visited(self, segment: Segment) -> float:
+        """Share of a motion that no recording has made: a law of no name may show there."""
+        column = self.recording.joints.index(self.question.joint)
+        made = commanded(self.recording)[:, column] / self.recording.gear
+        ticks = np.arange(0.0, segment.duration, TICK)
+        return newly_visited(made, np.interp(ticks, segment.time, segment.angle[:, column]))
+
+
+def _rms(apart: Mapping[tuple[str, str], float], answers: Mapping[str, JointObservation]) -> float:
+    """The least evidence as a distance in noise units (rms)."""
+    return math.sqrt(2.0 * min(apart.values()) / max(o.size for o in answers.values()))
+
+
+def _within(recording: Recording, joint: str) -> tuple[Segment, ...]:
+    """Motions of a joint as large as those that were recorded."""
+    j = recording.joints.index(joint)
+    reach = float(np.abs(recording.command.values[:, j]).max()) / recording.gear
+    return library(joint, recording.joints, round(reach, 3), recording.rig)
+
+
+def _limits(recording: Recording) -> tuple[float, float, float]:
+    """Largest tension in N and angle in rad, and least tension, that the rig has been through."""
+    tension, slack = recording.rig.tension.calibration_ceiling, 0.0
+    if recording.tension is not None:
+        seen = recording.tension.values[recording.tension.valid]
+        tension = min(tension, MARGIN * float(seen.max()))
+        slack = float(seen.min()) / MARGIN
+    bending = MARGIN * float(np.abs(recording.bending.values[recording.bending.valid]).max())
+    return tension, bending, slack
 
 
 def _experiment(
-    motion: Waveform, why: str, separates: tuple[str, ...], distances: dict[str, float]
+    segment: Segment,
+    joints: tuple[str, ...],
+    why: str,
+    separates: tuple[str, ...],
+    distances: Mapping[str, float],
 ) -> NextExperiment:
-    columns = np.zeros((len(motion.time), len(JOINTS)))
-    columns[:, JOINTS.index(motion.joint)] = motion.angle
+    columns = np.zeros((len(segment.time), len(JOINTS)))
+    for k, joint in enumerate(joints):
+        columns[:, JOINTS.index(joint)] = segment.angle[:, k]
     return NextExperiment(
         why,
         separates,
-        motion.name,
-        motion.joint,
+        segment.name,
+        segment.joint,
         distances,
-        tuple(map(float, motion.time)),
+        tuple(map(float, segment.time)),
         tuple((float(row[0]), float(row[1])) for row in columns),
         JOINTS,
     )
@@ -273,113 +336,40 @@ def is_wide(effect: NamedEffect) -> bool:
 
 
 def narrow(
-    recording: Recording,
-    plant: PlantDescription,
-    effect: NamedEffect,
-    jobs: int = 1,
-    played: Played = (),
+    case: ExplainedCase, effect: NamedEffect, jobs: int = 1, played: Played = ()
 ) -> NextExperiment | None:
-    """Propose the motion that narrows the interval of an effect's strength, which `plant` has.
+    """Propose the motion that narrows the interval of an effect's strength most per second.
 
     None where no safe motion, but those that were played, is expected to halve it. The precision is
-    what the recording and the motion have of it together, by white noise (Box, Lucas, Biometrika
+    what the recordings and the motion have of it together, by white noise (Box, Lucas, Biometrika
     46, 1959).
     """
-    base, flags = packed_joint(plant, effect.joint)
-    free = nominal_parameters(base, NOMINAL_BAND) + effect_parameters(effect.id)
-    strength = [k for k, item in enumerate(free) if item.index == effect.definition.places[0]]
+    recording, plant = case.recording, case.explanation.augmented
+    law = _law(recording, plant, effect.joint)
+    strength = [k for k, i in enumerate(law.model.free) if i.index == effect.definition.places[0]]
     if not strength:
         return None
-
-    def seen(recording: Recording) -> JointModel:
-        observation = next(o for o in observe(recording, plant) if o.joint == effect.joint)
-        return JointModel(observation, base, flags, free)
-
-    def precision(model: JointModel) -> Array:
-        theta = [i.coordinate(1.0 if i.index == LEAD else float(base[i.index])) for i in free]
-        slope = jacobian(model, np.array(theta))
-        return np.asarray(slope.T @ slope)
-
-    own = seen(recording)
-    before = precision(own) + np.diag(own.prior_weight() ** 2)
+    question = OpenQuestion(effect.joint, {}, Contest((), (), 0.0, True), recording.duration)
+    asking = Asking(recording, question, {effect.id: law}, law.noise)
 
     def deviation(known: Array) -> float:
         return float(np.sqrt(np.linalg.inv(known)[strength[0], strength[0]]))
 
-    motions = [
-        motion
-        for motion in safe_family(recording, [plant], effect.joint)
-        if (motion.name, motion.joint) not in played
-    ]
-    after = parallel_map(
-        lambda m: deviation(before + precision(seen(imagine(plant, m, recording.rig)))),
-        motions,
-        jobs,
-    )
-    shares = [each / deviation(before) for each in after]
-    if not shares or min(shares) > HALVED:
+    def left(full: Segment) -> tuple[float, Segment]:
+        segment, answers = asking.seen(full)
+        if not answers:
+            return 1.0, segment
+        slopes = law.slopes(answers[effect.id])
+        return deviation(law.precision + slopes.T @ slopes) / deviation(law.precision), segment
+
+    motions = [m for m in _within(recording, effect.joint) if (m.name, m.joint) not in played]
+    halving = [each for each in parallel_map(left, motions, jobs) if each[0] <= HALVED]
+    if not halving:
         return None
-    best = motions[int(np.argmin(shares))]
+    share, best = min(halving, key=lambda each: math.log(each[0]) / each[1].duration)
     name = effect.definition.parameters[0].name
-    return _experiment(
-        best,
-        f'{best.name.capitalize()} of {best.joint} would leave {min(shares):.0%} of the interval '
-        f'of {name} of {effect.id}.',
-        (effect.id,),
-        {},
+    why = (
+        f'{best.name.capitalize()} of {best.joint}, {best.duration:.0f} s, would leave {share:.0%} '
+        f'of the interval of {name} of {effect.id}.'
     )
-
-
-def rival_plant(
-    recording: Recording, plant: PlantDescription, effect: NamedEffect, rival: str
-) -> PlantDescription | None:
-    """Fit a rival in an effect's place; None where it has no simulation or is there besides."""
-    there = {e.id for e in plant.effects if e.joint == effect.joint}
-    if rival not in KNOWN or rival in there:
-        return None
-    others = tuple(e for e in plant.effects if (e.id, e.joint) != (effect.id, effect.joint))
-    places = (effect.id, *effect.definition.traits.families)
-    bare = without_functions(replace(plant, effects=others), effect.joint, places)
-    return _with_effect(recording, bare, effect.joint, rival)
-
-
-def _with_effect(
-    recording: Recording, bare: PlantDescription, joint: str, rival: str
-) -> PlantDescription | None:
-    """Fit an effect that a plant has not; None where nothing of it shows."""
-    observation = next(o for o in observe(recording, bare) if o.joint == joint)
-    behind = background(refit(bare, observation, 0.2, 2))
-    terms = tuple(Term(describe(rival), start) for start in starting_points(describe(rival)))
-    ways = directions(behind, terms, 1)
-    if not ways:
-        return None
-    # Beside numbers that are bent by what was taken out, a rival may gain nothing at its starts.
-    ranked = screened(behind, ways) or [ways[0].term]
-    packed = ranked[0].added_to(behind.fit.model).base
-    term = replace(bare, effects=(*bare.effects, spec_of(describe(rival), joint, packed)))
-    return with_fit(term, joint, refit(term, observation, 0.2, 6))
-
-
-def safe_family(
-    recording: Recording, plants: Sequence[PlantDescription], joint: str
-) -> list[Waveform]:
-    """List motions that keep every rival within what the rig has been through."""
-    j = recording.joints.index(joint)
-    reach = float(np.abs(recording.command.values[:, j]).max()) / recording.gear
-    tension, slack = recording.rig.tension.calibration_ceiling, 0.0
-    if recording.tension is not None:
-        seen = recording.tension.values[recording.tension.valid]
-        tension = min(tension, MARGIN * float(seen.max()))
-        slack = float(seen.min()) / MARGIN
-    bending = MARGIN * float(np.abs(recording.bending.values[recording.bending.valid]).max())
-    others = tuple(name for name in recording.joints if name != joint)
-    safe: list[Waveform] = []
-    for full in family(joint, others, reach):
-        for share in (1.0, 0.75, 0.5, 0.3):
-            time, angle = as_played(full.time, share * full.angle[:, None], recording.rig)
-            waveform = replace(full, time=time, angle=angle[:, 0])
-            answers = (imagine(p, waveform, recording.rig) for p in plants)
-            if all(is_safe(each, tension, bending, slack) for each in answers):
-                safe.append(waveform)
-                break
-    return safe
+    return _experiment(best, recording.joints, why, (effect.id,), {})

@@ -1,85 +1,148 @@
-"""Motions of one joint, of which an experiment is chosen: each shows other physics."""
+"""Short motions of a joint, of which an experiment is chosen: each shows other physics."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.physics.simulator import TICK
+from endoscope_core.rig import Rig
+from endoscope_core.safety import MotionLimits, MotionShaper
 from endoscope_core.signals import Signal, hold, move, sequence
-from endoscope_core.signals.motions import chirp, multisine, steps_with_holds, triangle
+from endoscope_core.signals.motions import LOOP, chirp, multisine, ramps, steps_with_holds
 
 Array = NDArray[np.float64]
 
 SAMPLE_S = 0.01
+SETTLES_S = 1.0
+"""Most that a motion may end later than was asked for, because the rig is slower."""
+SIZES = (1.0, 0.5)
+"""Shares of a joint's reach at which a motion is on offer."""
+RISE_S = 0.4
+"""Of a step: about as quick as the rig of the package may be over its whole reach."""
+SMALLEST = 0.3
+"""Of its size, a motion that is not safe is made smaller to."""
 
 
 @dataclass(frozen=True)
-class Waveform:
-    """A motion of one joint; the others rest."""
+class Segment:
+    """A motion from rest to rest."""
 
     name: str
-    joint: str
+    joint: str  # that moves
     time: Array  # (N,), s
-    angle: Array  # (N,), desired bending angle in rad
+    angle: Array  # (N, J), desired bending angles in rad, of all joints of a rig
+
+    @property
+    def duration(self) -> float:
+        """In s."""
+        return float(self.time[-1])
 
 
-def family(joint: str, others: tuple[str, ...], reach: float) -> list[Waveform]:
-    """List the motions of a joint up to `reach` rad; the others are each moved alone, too."""
-    a = reach
-    signals = [
-        ('steps with holds', steps_with_holds((0.5 * a, a, 0.2 * a, -a, -0.4 * a), 0.15, 2.0)),
-        ('slow ramps', triangle(a, 0.25 * a)),
-        ('chirp', chirp(0.7 * a, 14.0, 0.2, 5.0)),
-        ('multisine', multisine(a, 14.0)),
-        ('nested reversals', nested_reversals(a)),
-        ('fast and slow', fast_and_slow(a)),
-        ('rest on either side', rest_on_either_side(a)),
-    ]
-    found = [_sampled(name, joint, signal) for name, signal in signals]
-    found += [_sampled(f'{other} alone', other, multisine(a, 14.0)) for other in others]
-    return found
+def as_played(time: Array, angle: Array, rig: Rig, tick: float = TICK) -> tuple[Array, Array]:
+    """A motion (N, J) in rad at times (N,) as the console plays it: within a rig's limits.
+
+    It is shaped every `tick` s; the console does so every ms.
+    """
+    facts = rig.joints
+    joints = angle.shape[1]
+    shaper = MotionShaper(
+        MotionLimits.either_way(
+            joints, facts.reach, facts.speed, facts.acceleration, facts.entry_step
+        )
+    )
+    ticks = np.arange(time[0], time[-1] + SETTLES_S, tick)
+    wanted = np.stack([np.interp(ticks, time, column) for column in angle.T], axis=1)
+    shaper.restart(wanted[0])
+    shaped = np.array([shaper.shape(each, tick) for each in wanted.tolist()])
+    every = round(SAMPLE_S / tick)
+    return ticks[::every], shaped[::every]
+
+
+# The same for every question about a rig.
+@lru_cache(maxsize=32)
+def library(joint: str, joints: tuple[str, ...], reach: float, rig: Rig) -> tuple[Segment, ...]:
+    """Motions of one of a rig's joints up to `reach` rad, as the rig plays them, by size.
+
+    Where there are two joints, the other one is moved alone, too, and stands bent meanwhile.
+    """
+    found = []
+    for size in SIZES:
+        of_size = '' if size == 1.0 else f' of {size:.0%}'
+        for signal in _signals(size * reach):
+            found.append(_played(f'{signal.name}{of_size}', joint, {joint: signal}, joints, rig))
+        for other in (name for name in joints if name != joint):
+            alone = {other: multisine(size * reach, 6.0)}
+            found.append(_played(f'{other} alone{of_size}', other, alone, joints, rig))
+            stroke = _stroke('', size * reach, 3.0)
+            begun = [hold(1.0), stroke, hold(1.0)]
+            bent = sequence(
+                '', [move(0.0, reach, 1.0), hold(stroke.duration, reach), move(reach, 0.0, 1.0)]
+            )
+            beside = {joint: sequence('', begun), other: bent}
+            found.append(_played(f'stroke beside {other}{of_size}', joint, beside, joints, rig))
+    return tuple(found)
+
+
+def _signals(reach: float) -> Iterator[Signal]:
+    """Motions between -+`reach` rad, by name; they last 3 to 10 s."""
+    yield _stroke('stroke', reach, 4.0)
+    yield _stroke('quick stroke', reach, 2.0)
+    yield _stroke('slow stroke', reach, 8.0)
+    for side, way in (('positive', reach), ('negative', -reach)):
+        rests = [move(0.0, way, 1.0), hold(5.0, way), move(way, 0.0, 1.0)]
+        yield sequence(f'{side} hold', rests)
+        inner = [way, way - np.sign(way) * LOOP]
+        loops = ramps((0.0, inner[0], inner[1], inner[0], inner[1], 0.0), abs(reach))
+        yield sequence(f'{side} loops', [loops])
+        yield sequence(
+            f'{side} steps', [steps_with_holds((0.4 * way, way, 0.6 * way), RISE_S, 0.8)]
+        )
+    yield sequence('loops around zero', [ramps((0.0, LOOP, -LOOP, LOOP, -LOOP, 0.0), abs(reach))])
+    yield sequence('steps', [steps_with_holds((reach, -0.4 * reach, 0.3 * reach, -reach), RISE_S)])
+    yield sequence('chirp', [chirp(0.7 * reach, 5.0, 0.3, 5.0)])
+    yield sequence('multisine', [multisine(reach, 6.0)])
+    yield nested_reversals(reach)
+    yield fast_and_slow(reach)
+
+
+def _stroke(name: str, reach: float, duration: float) -> Signal:
+    """To both sides and back, smoothly (`reach` in rad, all of it in `duration` s)."""
+    quarter = 0.25 * duration
+    return sequence(
+        name,
+        [
+            move(0.0, reach, quarter),
+            move(reach, -reach, 2.0 * quarter),
+            move(-reach, 0.0, quarter),
+            hold(0.3),
+        ],
+    )
 
 
 def nested_reversals(reach: float) -> Signal:
     """Turn back earlier and earlier: inner loops within outer ones (`reach` in rad)."""
     parts, here = [], 0.0
-    for share in (1.0, -1.0, 0.8, -0.6, 0.6, -0.3, 0.4, 0.0, 0.2, 0.0):
+    for share in (1.0, -0.8, 0.6, -0.4, 0.4, -0.2, 0.0):
         target = share * reach
-        parts.append(move(here, target, 0.4 + 1.2 * abs(target - here) / max(reach, 1e-9)))
+        parts.append(move(here, target, 0.3 + 0.7 * abs(target - here) / max(reach, 1e-9)))
         here = target
     return sequence('nested reversals', parts)
 
 
 def fast_and_slow(reach: float) -> Signal:
-    """Make the same stroke at three speeds: what depends on speed shows against what does not."""
-    parts: list[Signal] = []
-    for duration in (3.0, 1.2, 0.5):
-        parts += [
-            move(0.0, reach, 0.5 * duration),
-            move(reach, -reach, duration),
-            move(-reach, 0.0, 0.5 * duration),
-            hold(0.4),
-        ]
-    return sequence('fast and slow', parts)
+    """Make the same stroke at two speeds: what depends on speed shows against what does not."""
+    strokes = [_stroke('', reach, 6.0), _stroke('', reach, 1.6)]
+    return sequence('fast and slow', strokes)
 
 
-def rest_on_either_side(reach: float) -> Signal:
-    """Rest for long at rest, bent one way and bent the other: what changes by itself shows."""
-    return sequence(
-        'rest on either side',
-        [
-            hold(3.0),
-            move(0.0, reach, 1.0),
-            hold(5.0, reach),
-            move(reach, -reach, 1.5),
-            hold(5.0, -reach),
-            move(-reach, 0.0, 1.0),
-            hold(1.0),
-        ],
-    )
-
-
-def _sampled(name: str, joint: str, signal: Signal) -> Waveform:
-    time = np.arange(0.0, signal.duration + 0.5 * SAMPLE_S, SAMPLE_S)
-    angle, _ = signal(time)
-    return Waveform(name, joint, time, np.asarray(angle))
+def _played(
+    name: str, joint: str, signals: dict[str, Signal], joints: tuple[str, ...], rig: Rig
+) -> Segment:
+    end = max(signal.duration for signal in signals.values())
+    time = np.arange(0.0, end + 0.5 * SAMPLE_S, SAMPLE_S)
+    still = np.zeros_like(time)
+    columns = [signals[each](time)[0] if each in signals else still for each in joints]
+    return Segment(name, joint, *as_played(time, np.stack(columns, axis=1), rig, SAMPLE_S))

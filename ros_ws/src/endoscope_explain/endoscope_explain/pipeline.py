@@ -14,7 +14,6 @@ from endoscope_explain.audit import AuditReport, audit_recording
 from endoscope_explain.case import (
     ChainCut,
     ExplainedCase,
-    NextExperiment,
     Place,
     combined_effects,
     combined_verdict,
@@ -22,7 +21,7 @@ from endoscope_explain.case import (
 )
 from endoscope_explain.compare import confirmed_by, ladders
 from endoscope_explain.decide.given_physics import GivenJoints
-from endoscope_explain.design import propose
+from endoscope_explain.design import propose, what_is_asked
 from endoscope_explain.explain_recording import Progress, explain_recording
 from endoscope_explain.explanation import Explanation, Verdict
 from endoscope_explain.fit.between_rows import with_command_between_rows
@@ -180,19 +179,10 @@ def explain_case(
     if answered is not None:
         answered(case)
     if explanation.fit and not sources.quick:
-        case = replace(case, next_experiment=_next(case, jobs, tell))
+        tell('looking for the motion that decides what is left open')
+        case = replace(case, next_experiment=propose(case, what_is_asked(case), jobs))
     held_out, second = ladders(explanation, validation)
     return replace(case, ladder=held_out, validation=second, runtime_s=time.monotonic() - begun)
-
-
-def _next(case: ExplainedCase, jobs: int, tell: Progress) -> NextExperiment | None:
-    for effect in case.effects:
-        if effect.alternatives:
-            tell(f'looking for the motion that tells {effect.id} from its rivals')
-            found = propose(case.recording, case.explanation.augmented, effect, jobs)
-            if found is not None:
-                return found
-    return None
 
 
 def _cuts(case: ExplainedCase) -> tuple[ChainCut, ...]:

@@ -51,6 +51,11 @@ class Contest:
         names, gains = tuple(n for n, _ in left), tuple(g for _, g in left)
         return replace(self, names=names, gains=gains)
 
+    def temperature(self, more: float = 1.0) -> float:
+        """By how much evidence is divided where it is read, once `more` times as much is there."""
+        gains = [[more * gain for gain in self.gains]]
+        return float(_temperature(gains, [self.form], [self.beyond_form], POSTERIOR)[0])
+
     def probabilities(self, weights: Sequence[float] | None = None) -> Array:
         """Probability (k + 2,) of each of the names, of nothing, and of something else."""
         weights = POSTERIOR if weights is None else weights
@@ -115,8 +120,17 @@ def log_odds(
     w, gained = np.array(weights), np.array(gains, dtype=float)
     top = np.max(gained, axis=1, initial=0.0)
     left = np.log1p(np.array(beyond_form))
-    of = np.stack([np.ones_like(top), np.log1p(top), np.log1p(np.maximum(form, 0.0)), left])
-    temperature = np.exp(np.clip(w[:4] @ of, math.log(_COLDEST), math.log(_HOTTEST)))
-    names = (gained - top[:, None]) / temperature[:, None]
+    names = (gained - top[:, None]) / _temperature(gained, form, beyond_form, weights)[:, None]
     nothing = w[4] + w[5] * np.array(found) + w[6] * np.log1p(top)
     return np.column_stack([names, nothing, w[7] + w[8] * left])
+
+
+def _temperature(
+    gains: ArrayLike, form: ArrayLike, beyond_form: ArrayLike, weights: Sequence[float]
+) -> Array:
+    """Temperature (m,) of the evidence of m contests."""
+    top = np.max(np.array(gains, dtype=float), axis=1, initial=0.0)
+    left = np.log1p(np.array(beyond_form))
+    of = np.stack([np.ones_like(top), np.log1p(top), np.log1p(np.maximum(form, 0.0)), left])
+    bounds = math.log(_COLDEST), math.log(_HOTTEST)
+    return np.asarray(np.exp(np.clip(np.array(weights)[:4] @ of, *bounds)))

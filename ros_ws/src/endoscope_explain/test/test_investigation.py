@@ -124,7 +124,7 @@ def told(stribeck_case):
     """A case in which no name has a rival."""
     (effect,) = stribeck_case.effects
     return dataclasses.replace(
-        stribeck_case, effects=(dataclasses.replace(effect, alternatives=()),)
+        stribeck_case, effects=(dataclasses.replace(effect, alternatives=(), contest=None),)
     )
 
 

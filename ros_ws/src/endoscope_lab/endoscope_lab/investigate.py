@@ -21,8 +21,7 @@ from endoscope_core.rig import shipped_rig
 from endoscope_core.signals.command_file import CommandTable, read_command_file
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.case import ExplainedCase
-from endoscope_explain.design import SAMPLE_S, as_played
-from endoscope_explain.experiment_motions import family
+from endoscope_explain.experiment_motions import SAMPLE_S, as_played, library
 from endoscope_explain.explanation import Explanation
 from endoscope_explain.investigation.investigation import (
     EXPERIMENTS,
@@ -275,13 +274,10 @@ def fixed_motion(first: Motion, duration: float) -> CommandTable:
     """A motion of some length that asks nothing: the first one, then all of the family by turns."""
     # These are what the loop chooses from, in their order, on one joint after the other.
     joints, names = first.joint.split(' and '), first.table.joints
-    parts = []
-    for motions in zip(*(family(joint, (), first.largest) for joint in joints), strict=True):
-        for motion in motions:
-            angle = np.zeros((len(motion.time), len(names)))
-            angle[:, names.index(motion.joint)] = motion.angle
-            parts.append(angle)
-    rest = np.concatenate(parts)
+    by_joint = [library(joint, tuple(joints), first.largest, shipped_rig()) for joint in joints]
+    angles = [each.angle for motions in zip(*by_joint, strict=True) for each in motions]
+    rest = np.zeros((sum(map(len, angles)), len(names)))
+    rest[:, [names.index(joint) for joint in joints]] = np.concatenate(angles)
     count = math.ceil((duration - first.duration) / SAMPLE_S)
     rest = np.tile(rest, (math.ceil(count / len(rest)), 1))[:count]
     time, angle = as_played(

@@ -6,18 +6,15 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from endoscope_core.atomic_output import write_text
 from endoscope_core.errors import NotPlayedError, RigStoppedError
 from endoscope_core.investigation_folder import PAGE
 from endoscope_core.physics.description import PlantDescription
-from endoscope_core.physics.effects import KNOWN
 from endoscope_core.physics.plant_file import load_plant, save_plant
 from endoscope_core.rig import Rig
 from endoscope_core.signals.command_file import JOINTS, write_command_file
-from endoscope_explain.case import ExplainedCase, NextExperiment
-from endoscope_explain.design import is_wide, narrow, propose, propose_beside_numbers
+from endoscope_explain.case import ExplainedCase
+from endoscope_explain.design import is_wide, propose, what_is_asked
 from endoscope_explain.explanation import NamedEffect, Verdict
 from endoscope_explain.investigation import log as logs
 from endoscope_explain.investigation.log import Answer, Log, Name, Round, Stop
@@ -28,6 +25,8 @@ from endoscope_explain.investigation.motions import (
     require_allowed,
 )
 from endoscope_explain.investigation.tracking import PlayThrough, held_out, with_tracking
+from endoscope_explain.open_questions import open_questions
+from endoscope_explain.operator_changes import what_would_decide
 from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
 from endoscope_explain.prediction_set import OTHER_NUMBERS, Posterior
 from endoscope_explain.report.left_open import in_words
@@ -129,6 +128,7 @@ class _Running:
     log: Log
     page: Page | None
     say: Callable[[str], None]
+    would_decide: str = ''  # what would, where no motion does
 
     def keep(self, log: Log) -> None:
         """Write what is known now."""
@@ -175,7 +175,10 @@ class _Running:
         self.say('looking for the motion that tells more')
         began = time.monotonic()
         played = {(each.motion, each.joint) for each in whole}
-        proposed = _proposed(case, self.of.jobs, played)
+        asked = what_is_asked(case)
+        proposed = propose(case, asked, self.of.jobs, played)
+        if proposed is None:
+            self.would_decide = what_would_decide(asked, self.of.jobs)
         self.keep(self.log.with_whole(proposed_s=time.monotonic() - began))
         return Stop.NOTHING_TO_GAIN if proposed is None else of_experiment(proposed)
 
@@ -202,7 +205,8 @@ class _Running:
         )
         return {
             Stop.ONE_CLASS: f'{alone} {after}.',
-            Stop.NOTHING_TO_GAIN: f'no safe motion is expected to tell more {after}.{left}',
+            Stop.NOTHING_TO_GAIN: f'no safe motion is expected to tell more {after}.{left}'
+            f'{self.would_decide and " "}{self.would_decide}',
             Stop.USED_UP: f'no more than {self.of.experiments} experiments were wanted.{left}',
         }[stop]
 
@@ -254,37 +258,4 @@ def _beside_numbers(case: ExplainedCase) -> dict[str, tuple[str, ...]]:
 
 
 def _asks_more(case: ExplainedCase) -> bool:
-    rivals = [e.alternatives for e in case.effects] + list(_beside_numbers(case).values())
-    return any(map(is_wide, case.effects)) or any(a in KNOWN for each in rivals for a in each)
-
-
-def _proposed(
-    case: ExplainedCase, jobs: int, played: set[tuple[str, str]]
-) -> NextExperiment | None:
-    """The motion that tells rivals apart, or that narrows a wide interval where none has any."""
-    recording, plant = case.recording, case.explanation.augmented
-    there = {(spec.id, spec.joint) for spec in plant.effects}
-    known = [e for e in case.effects if (e.id, e.joint) in there]
-    left = _left(case)
-    for effect in known:
-        found = propose(recording, plant, effect, jobs, played, left)
-        if found is not None:
-            return found
-    described = case.explanation.nominal
-    for joint, effects in _beside_numbers(case).items():
-        found = propose_beside_numbers(
-            recording, plant, described, joint, effects, jobs, played, left
-        )
-        if found is not None:
-            return found
-    for effect in filter(is_wide, known):
-        found = narrow(recording, plant, effect, jobs, played)
-        if found is not None:
-            return found
-    return None
-
-
-def _left(case: ExplainedCase) -> float:
-    """What the improved plant leaves of a recording, in its noise (rms over signals)."""
-    ratios = [fit.ratio for fit in case.explanation.fit.get('augmented', {}).values()]
-    return float(np.sqrt(np.mean(np.square(ratios)))) if ratios else 1.0
+    return bool(open_questions(case)) or any(map(is_wide, case.effects))

@@ -20,7 +20,7 @@ from endoscope_core.signals.command_file import (
     read_command_file,
     write_command_file,
 )
-from endoscope_explain.design import SAMPLE_S, as_played
+from endoscope_explain.experiment_motions import SAMPLE_S, as_played
 from endoscope_explain.investigation import log as logs
 from endoscope_explain.investigation.log import Log, Tracking
 from endoscope_explain.investigation.motions import Motion, commissioning, require_allowed

@@ -96,6 +96,14 @@ def _passed_by(moments: bytes, apart_s: float) -> tuple[Mask, Mask]:
     return before, again
 
 
+def newly_visited(made: Array, command: Array) -> float:
+    """Share of a command (N,) in rad on ticks whose branch commands `made` (M,) have not passed."""
+    every = _ticks(TICK)
+    before, after = made[::every], command[::every]
+    passed, _ = _passed_by(np.concatenate([before, after]).tobytes(), every * TICK)
+    return float(1.0 - np.mean(passed[len(before) :]))
+
+
 def strokes(command: Array, tick: float = TICK) -> list[Stroke]:
     """What a command (N,) in rad makes from turn to turn, and which share of it comes again."""
     angle, (before, again) = command[:: _ticks(tick)], _passed(command, tick)

@@ -1,0 +1,170 @@
+"""What an answer leaves open, and each law that it may be, fitted to the recordings."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.effects import KNOWN, describe
+from endoscope_core.physics.packing import without_functions
+from endoscope_explain.case import ExplainedCase
+from endoscope_explain.decide.conclusions import spec_of
+from endoscope_explain.explanation import NamedEffect
+from endoscope_explain.fit.free_parameters import LEAD, effect_parameters, nominal_parameters
+from endoscope_explain.fit.model import Fit, JointModel, fit, joint_of, packed_joint
+from endoscope_explain.observe.observation import JointObservation, observe
+from endoscope_explain.prediction_set import NOTHING, OTHER_NUMBERS, SOMETHING_ELSE, Contest
+from endoscope_explain.recording import Recording
+from endoscope_explain.search.screen import background, directions, screened
+from endoscope_explain.search.term import Term, starting_points
+
+MOST_LAWS = 3
+"""Of a question that are fitted: the likeliest."""
+BAND = 0.2
+"""Relative freedom of the nominal numbers beside a law that is fitted anew."""
+
+
+@dataclass(frozen=True)
+class OpenQuestion:
+    """What a joint may lack, by its names."""
+
+    joint: str
+    chances: Mapping[str, float]  # of each law that is left open, the one that is said first
+    contest: Contest
+    duration: float  # of the recordings, s
+    effect: NamedEffect | None = None  # that is said; None where none is
+
+    def decides(self, duration: float, decided: float) -> float:
+        """Evidence in nats that is read as `decided` once a motion of `duration` s is made."""
+        return decided * self.contest.temperature(1.0 + duration / self.duration)
+
+    def brings(
+        self, apart: Mapping[tuple[str, str], float], duration: float, decided: float
+    ) -> tuple[float, float]:
+        """Evidence that a motion of `duration` s is expected to bring, in nats as it is read.
+
+        `apart` is the evidence in nats of a law that is true over another one. Also, per second,
+        what of it brings the true one no further than to odds of `exp(decided)`.
+        """
+        temperature = self.decides(duration, 1.0)
+        whole = useful = 0.0
+        total = sum(self.chances.values())
+        for true, p in self.chances.items():
+            for other, q in self.chances.items():
+                if other == true:
+                    continue
+                weight = p * q / (total * (total - p))
+                nats = apart.get((true, other), 0.0) / temperature
+                whole += weight * nats
+                useful += weight * min(nats, max(0.0, decided - math.log(p / q)))
+        return whole, useful / duration
+
+
+def open_questions(case: ExplainedCase) -> list[OpenQuestion]:
+    """What is left open beside each effect of a case, and at joints of which no more is said."""
+    explanation, found = case.explanation, []
+    duration = case.recording.duration
+    for effect in case.effects:
+        if effect.contest is not None:
+            chances = _chances(effect.contest, effect.id)
+            found.append(OpenQuestion(effect.joint, chances, effect.contest, duration, effect))
+    for joint, contest in explanation.contests.items():
+        chances = _chances(contest, contest.nameless)
+        found.append(OpenQuestion(joint, chances, contest, duration))
+    return [each for each in found if len(each.chances) > 1]
+
+
+def _chances(contest: Contest, said: str) -> dict[str, float]:
+    """The set that is left open, each statement by the first of its names that can be simulated."""
+    chances: dict[str, float] = {}
+    for names, p in contest.left_open(said).items():
+        name = said if said in names else next((n for n in names if n in KNOWN), names[0])
+        chances[name] = chances.get(name, 0.0) + p
+    return dict(sorted(chances.items(), key=lambda each: each[0] != said))
+
+
+def fitted_laws(case: ExplainedCase, question: OpenQuestion) -> dict[str, PlantDescription]:
+    """A plant of each law that can be simulated, fitted to the recordings, by its name.
+
+    Without what is said there is nothing to compare: empty where the improved plant has it not.
+    """
+    recording, plant = case.recording, case.explanation.augmented
+    said, joint = next(iter(question.chances)), question.joint
+    there = {spec.id for spec in plant.effects if spec.joint == joint}
+    if question.effect is not None and said not in there:
+        return {}
+    laws = {said: plant}
+    for name in (n for n in question.chances if n not in {said, SOMETHING_ELSE, *there}):
+        if len(laws) == MOST_LAWS:
+            break
+        law = _law(recording, case.explanation.nominal, plant, question, name)
+        if law is not None:
+            laws[name] = law
+    return laws
+
+
+def _law(
+    recording: Recording,
+    described: PlantDescription,
+    plant: PlantDescription,
+    question: OpenQuestion,
+    name: str,
+) -> PlantDescription | None:
+    """The plant with another law in the place of what is said; None where it cannot have it."""
+    joint = question.joint
+    if question.effect is not None:
+        bare = without(plant, question.effect)
+    else:
+        bare = replace(plant, joints={**plant.joints, joint: described.joints[joint]})
+    if name in (NOTHING, OTHER_NUMBERS):
+        observation = next(o for o in observe(recording, bare) if o.joint == joint)
+        return with_fit(bare, joint, refit(bare, observation, 6))
+    return with_effect(recording, bare, joint, name) if name in KNOWN else None
+
+
+def without(plant: PlantDescription, effect: NamedEffect) -> PlantDescription:
+    """The plant without an effect, and without functions that are part of it."""
+    others = tuple(e for e in plant.effects if (e.id, e.joint) != (effect.id, effect.joint))
+    places = (effect.id, *effect.definition.traits.families)
+    return without_functions(replace(plant, effects=others), effect.joint, places)
+
+
+def refit(plant: PlantDescription, observation: JointObservation, iterations: int) -> Fit:
+    """Refit one joint of a plant, its effects included, from where it is."""
+    base, flags = packed_joint(plant, observation.joint)
+    free = nominal_parameters(base, BAND)
+    for spec in plant.effects:
+        if spec.joint == observation.joint:
+            free += effect_parameters(spec.id)
+    start = [i.coordinate(1.0 if i.index == LEAD else float(base[i.index])) for i in free]
+    model = JointModel(observation, base, flags, free)
+    return fit(model, np.array(start), iterations=iterations)
+
+
+def with_fit(plant: PlantDescription, joint: str, found: Fit) -> PlantDescription:
+    """Put the fitted numbers of one joint back into a plant."""
+    packed, _ = found.model.packed(found.theta)
+    effects = tuple(
+        spec_of(describe(spec.id), joint, packed) if spec.joint == joint else spec
+        for spec in plant.effects
+    )
+    return replace(plant, joints={**plant.joints, joint: joint_of(packed)}, effects=effects)
+
+
+def with_effect(
+    recording: Recording, bare: PlantDescription, joint: str, name: str
+) -> PlantDescription | None:
+    """Fit an effect that a plant has not; None where nothing of it shows."""
+    observation = next(o for o in observe(recording, bare) if o.joint == joint)
+    behind = background(refit(bare, observation, 2))
+    terms = tuple(Term(describe(name), start) for start in starting_points(describe(name)))
+    ways = directions(behind, terms, 1)
+    if not ways:
+        return None
+    # Beside numbers that are bent by what was taken out, a law may gain nothing at its starts.
+    ranked = screened(behind, ways) or [ways[0].term]
+    packed = ranked[0].added_to(behind.fit.model).base
+    term = replace(bare, effects=(*bare.effects, spec_of(describe(name), joint, packed)))
+    return with_fit(term, joint, refit(term, observation, 6))

@@ -1,0 +1,75 @@
+"""What an operator could change of a rig where no motion decides what an answer leaves open."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Protocol
+
+from endoscope_core.physics.description import EffectSpec, PlantDescription
+from endoscope_explain.design import Asking
+from endoscope_explain.prediction_set import SOMETHING_ELSE
+
+WEIGHT_NM = 9.81 * 0.005 * 0.03
+"""Moment of 5 g at 30 mm: a third of what bends a section like the described one by a radian."""
+BEND = 1.5
+"""Share of its bend that a tube in another shape has."""
+
+
+class Changed(Protocol):
+    """Changes one joint of a plant."""
+
+    def __call__(self, plant: PlantDescription, joint: str) -> PlantDescription:
+        """The changed plant."""
+        ...
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change of a rig by an amount that is known."""
+
+    words: str
+    minutes: int  # of an operator's work, as a guess
+    changed: Changed
+    unknown: str = ''  # nominal number that it leaves unknown
+
+
+def weighted(plant: PlantDescription, joint: str) -> PlantDescription:
+    """The plant with a weight at the tip of a joint's section, which hangs down when straight."""
+    hung = [e for e in plant.effects if (e.id, e.joint) == ('gravity', joint)]
+    numbers = dict(hung[0].parameters) if hung else {'phase_rad': 0.0}
+    numbers['moment_nm'] = numbers.get('moment_nm', 0.0) + WEIGHT_NM
+    others = tuple(e for e in plant.effects if e not in hung)
+    return replace(plant, effects=(*others, EffectSpec('gravity', joint, numbers)))
+
+
+def bent_more(plant: PlantDescription, joint: str) -> PlantDescription:
+    """The plant of a joint whose wires run through a tube of more bend."""
+    numbers = plant.joints[joint]
+    more = replace(numbers, capstan_exponent=BEND * numbers.capstan_exponent)
+    return replace(plant, joints={**plant.joints, joint: more})
+
+
+CHANGES = (
+    Change('a weight of 5 g at the tip, 30 mm from the joint', 2, weighted),
+    Change('a tube bent half as much again', 3, bent_more, 'capstan_exponent'),
+)
+
+
+def what_would_decide(asked: Sequence[Asking], jobs: int = 1) -> str:
+    """What would decide the first question between laws, in a sentence; empty if there is none."""
+    for asking in asked:
+        if len(asking.laws) < 2:
+            continue
+        joint = asking.question.joint
+        names = ' and '.join(name for name in asking.question.chances if name != SOMETHING_ELSE)
+        for change in CHANGES:
+            changed = partial(change.changed, joint=joint)
+            best = asking.once(changed, change.unknown).best(jobs, ())
+            if best is not None:
+                return (
+                    f'{change.words.capitalize()} would distinguish {names} '
+                    f'({best.segment.name}, {best.nats:.0f} nats; about {change.minutes} min of '
+                    'work).'
+                )
+        return f'Neither {" nor ".join(c.words for c in CHANGES)} would distinguish {names}.'
+    return ''
