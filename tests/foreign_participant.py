@@ -16,7 +16,7 @@ from cyclonedds.idl import IdlStruct
 from cyclonedds.idl.types import float64, sequence
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
-from handle import LATCHED, STREAM, Header, JointState, Joy, Participant, String, say
+from handle import LATCHED, STREAM, Header, JointState, Joy, Participant, String, publish
 
 _STREAMS = ('motor/measured_js', 'wires/measured_js', 'slave/measured_js')
 _STATE = 'slave/operating_state'
@@ -111,5 +111,5 @@ while now := dict(wanted):
         if heard := [sample(message) for message in reader.take(_MANY)]:
             tell(topic, heard)
     angle += min(max(now['angle'] - angle, -_STEP_RAD), _STEP_RAD)
-    say(now['held'], angle, handle, clutch)
+    publish(now['held'], angle, handle, clutch)
     time.sleep(_STEP_S)

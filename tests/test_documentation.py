@@ -1,6 +1,7 @@
 """What README and pages say is so: links, commands, files and everything that can be run."""
 
 import importlib
+import json
 import os
 import re
 import shutil
@@ -148,6 +149,25 @@ def test_pages_keep_what_the_code_says(tmp_path: Path) -> None:
         if page.read_text() != (WORKSPACE / 'doc' / page.relative_to(doc)).read_text()
     ]
     assert stale == [], 'run `make -C ros_ws reference` and commit what it writes'
+
+
+def test_records_are_whole_and_reached_from_the_pages() -> None:
+    files = sorted((WORKSPACE / 'doc/records').glob('*.json'))
+    text = ''.join(page.read_text(encoding='utf-8') for page in PAGES)
+    assert len(files) > 30
+    for file in files:
+        record = json.loads(file.read_text(encoding='utf-8'))
+        assert record.keys() >= {'command', 'date', 'machine', 'seeds', 'columns', 'rows'}, file
+        assert record['rows'], file
+        assert {len(row) for row in record['rows']} == {len(record['columns'])}, file
+        assert record.get('shown', {}).keys() <= set(record['columns']), file
+        assert bool(record.get('question')) == bool(record.get('figure')), file
+        assert f'(records/{file.name})' in text or f'table:{file.stem} ' in text, file
+
+
+def test_a_question_has_a_figure_on_few_lines() -> None:
+    page = (WORKSPACE / 'doc/how_well_it_works.md').read_text(encoding='utf-8')
+    assert len(page.splitlines()) <= 200
 
 
 def test_the_interface_that_others_rely_on_stands_in_the_reference() -> None:

@@ -1,6 +1,6 @@
 """Nodes as processes that die or stall, and second senders: nothing moves but on an enable.
 
-`endoscope bench faults` tries the other rows, and each of them often; see doc/faults.md.
+`endoscope bench faults` tries the other rows, and each of them often; see doc/how_well_it_works.md.
 """
 
 from random import Random

@@ -1,4 +1,4 @@
-"""Motors and master fail in the running graph, over a real terminal; see doc/device_faults.md."""
+"""Motors and master fail in the running graph, over a terminal; see doc/how_well_it_works.md."""
 
 import re
 

@@ -1,7 +1,7 @@
 """Sensors that fail while the slave moves: what it does, and what the bag shows.
 
 Real nodes in real time, real drivers over a pseudo-terminal and TCP.  Each fault prints how long
-the slave took, which `ros_ws/doc/device_faults_sensors.md` tabulates; nothing is asserted of it.
+the slave took, which `ros_ws/doc/records/faults_sensors.json` tabulates; nothing is asserted of it.
 """
 
 import time

@@ -1,7 +1,8 @@
-"""Writes into the reference pages what the code says: `make -C ros_ws reference`.
+"""Writes into the pages what code and records say: `make -C ros_ws reference`.
 
-A page keeps what is made for it between two comments, of which the first names the part. Nothing
-in a part depends on the terminal, the day or the place of the checkout.
+A page keeps what is made for it between two comments, of which the first names the part, or the
+table and the records that it is made from (`record_tables.py`). Nothing in a part depends on the
+terminal, the day or the place of the checkout.
 """
 
 import argparse
@@ -17,6 +18,7 @@ from textwrap import dedent
 from types import ModuleType
 from typing import Any
 
+import record_tables
 import yaml
 
 from endoscope_bags.table_mapping import EXAMPLE
@@ -44,7 +46,10 @@ CORE = (
 )
 DEVICES = ('dynamixel', 'load_cells', 'em_tracker')
 _INDENTED = re.compile(r'^(?: {4}.*\n)+', re.M)
-_PART = re.compile(r'(?<=^<!-- made from the code: )(\S+) -->\n.*?(?=^<!-- end -->$)', re.M | re.S)
+_PART = re.compile(
+    r'^(<!-- made from the (?:code|records): )(\S+) -->\n.*?(?=^<!-- end -->$)',
+    re.M | re.S,
+)
 
 
 def _table(heading: Iterable[str], rows: Iterable[Iterable[str]]) -> Iterator[str]:
@@ -343,7 +348,16 @@ PARTS: dict[str, Callable[[], Iterator[str]]] = {
 
 def with_current_parts(page: str) -> str:
     """Return the text of a page with its parts as the code has them now."""
-    return _PART.sub(lambda part: f'{part[1]} -->\n\n{_text(PARTS[part[1]]())}\n\n', page)
+    return _PART.sub(lambda part: f'{part[1]}{part[2]} -->\n\n{_text(_made(part[2]))}\n\n', page)
+
+
+def _made(part: str) -> Iterator[str]:
+    """Yield a part by its name, or a table of records: `answers:NAME,NAME` or `table:NAME`."""
+    kind, _, names = part.partition(':')
+    if not names:
+        return PARTS[part]()
+    rows = record_tables.TABLES[kind](*names.split(','))
+    return _table(next(rows), rows)
 
 
 def _text(lines: Iterator[str]) -> str:

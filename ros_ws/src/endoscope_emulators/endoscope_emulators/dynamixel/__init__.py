@@ -1,1 +1,1 @@
-"""Servos on a pseudo-terminal that keep to the maker's manual; see doc/dynamixel_emulator.md."""
+"""Servos on a pseudo-terminal that keep to the maker's manual; see doc/devices.md."""
