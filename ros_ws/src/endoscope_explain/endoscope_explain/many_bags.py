@@ -2,11 +2,9 @@
 
 import csv
 import io
-import json
-import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +14,7 @@ from endoscope_core.workers import worker_pool
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
 from endoscope_explain.report.sentences import told, verdict_sentence
-from endoscope_explain.report.writing import REPORT_HTML, REPORT_JSON, provenance, write_report
+from endoscope_explain.report.writing import REPORT_HTML, provenance, write_report
 from endoscope_explain.shared_physics import physics_of_all
 
 SUMMARY_CSV = 'summary.csv'
@@ -35,29 +33,14 @@ SUMMARY = (
 Say = Callable[[str], None]
 
 
-@dataclass(frozen=True)
-class Reported:
-    """A finished report."""
-
-    files: Mapping[str, bytes]  # by name
-    # What a person reads in the terminal; its first line is the verdict's sentence.
-    told: str
-
-    @property
-    def sentence(self) -> str:
-        """The verdict's sentence."""
-        return self.told.partition('\n')[0]
-
-    def content(self) -> dict[str, Any]:
-        """Return what report.json says."""
-        parsed: dict[str, Any] = json.loads(self.files[REPORT_JSON])
-        return parsed
+Content = Mapping[str, Any]
+"""What a report.json says."""
 
 
 def explained_case(
     sources: Sources, jobs: int = 1, progress: Progress | None = None
 ) -> ExplainedCase:
-    """Explain one bag; errors as in `explain_one`."""
+    """Explain one bag; BagError if a recording cannot be used."""
     tell = progress or (lambda _: None)
     inputs = read_inputs(sources)
     for note in inputs.audit.recording.notes:
@@ -83,24 +66,12 @@ def explained_cases(
     EndoscopeError if a recording cannot be used, or what was asked for does not go together.
     """
     sources = _prepared(sources, jobs, same_physics, progress)
-    if len(sources) == 1:
-        return [explained_case(sources[0], jobs, progress)]
     cases: dict[int, ExplainedCase] = {}
-    for index, case in _here(explained_case, sources, jobs):
+    for index, case in _as_they_come(sources, jobs, progress):
         cases[index] = case
-        if progress is not None:
+        if progress is not None and len(sources) > 1:
             progress(f'{len(cases)}/{len(sources)} {case.recording.name}')
     return [case for _, case in sorted(cases.items())]
-
-
-def explain_one(sources: Sources, jobs: int = 1, progress: Progress | None = None) -> Reported:
-    """Explain one bag; BagError if a recording cannot be used."""
-    case = explained_case(sources, jobs, progress)
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch)
-        write_report(case, folder)
-        files = {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
-        return Reported(files, told(case))
 
 
 def explain_bags(
@@ -111,8 +82,8 @@ def explain_bags(
     same_physics: bool = False,
     say: Say = print,
     progress: Progress | None = None,
-) -> dict[str, Reported]:
-    """Explain bags and write their reports by the bag's name, all or none.
+) -> dict[str, Content]:
+    """Explain bags and write their reports by the bag's name, all or none; what they contain.
 
     `out` is new or empty: one report's own folder, or that of one folder for each bag. With
     `same_physics` all bags show one rig, and one choice of effects has to explain all of them.
@@ -120,25 +91,24 @@ def explain_bags(
     """
     require_free_directory(out)
     sources = _prepared(sources, jobs, same_physics, progress or say)
-    if len(sources) == 1:
-        reported = explain_one(sources[0], jobs, progress)
-        with atomic_directory(out) as folder:
-            _write(reported, folder)
-        say(f'{reported.told}\nReport: {out / REPORT_HTML}')
-        return {unique_names([sources[0].bag])[0]: reported}
-    names = unique_names([one.bag for one in sources])
-    rows: dict[str, Reported] = {}
+    names, alone = unique_names([one.bag for one in sources]), len(sources) == 1
+    written: dict[str, Content] = {}
+    last = f'Reports: {out}'
     with atomic_directory(out) as folder:
-        for index, reported in _here(explain_one, sources, jobs):
+        for index, case in _as_they_come(sources, jobs, progress):
             name = names[index]
-            (folder / name).mkdir()
-            _write(reported, folder / name)
-            rows[name] = reported
-            say(f'{len(rows)}/{len(sources)} {name}: {reported.sentence}')
-        in_order = {name: rows[name] for name in names}
-        (folder / SUMMARY_CSV).write_text(summary_table(in_order), encoding='utf-8')
-        (folder / PARAMETERS_CSV).write_text(parameter_table(in_order), encoding='utf-8')
-    say(f'Reports: {out}')
+            own = folder if alone else folder / name
+            own.mkdir(exist_ok=alone)
+            written[name] = write_report(case, own)
+            if alone:
+                last = f'{told(case)}\nReport: {out / REPORT_HTML}'
+            else:
+                say(f'{len(written)}/{len(sources)} {name}: {verdict_sentence(case)}')
+        in_order = {name: written[name] for name in names}
+        if not alone:
+            (folder / SUMMARY_CSV).write_text(summary_table(in_order), encoding='utf-8')
+            (folder / PARAMETERS_CSV).write_text(parameter_table(in_order), encoding='utf-8')
+    say(last)
     return in_order
 
 
@@ -155,9 +125,8 @@ def unique_names(bags: Sequence[Path]) -> list[str]:
     return names
 
 
-def summary(name: str, reported: Reported) -> dict[str, Any]:
+def summary(name: str, content: Content) -> dict[str, Any]:
     """Return one bag's line of the summary as plain data."""
-    content = reported.content()
     return {
         'bag': name,
         'verdict': content['verdict'],
@@ -171,11 +140,11 @@ def summary(name: str, reported: Reported) -> dict[str, Any]:
     }
 
 
-def summary_table(reports: Mapping[str, Reported]) -> str:
+def summary_table(reports: Mapping[str, Content]) -> str:
     """Return one CSV line for each bag: verdict, effects, largest misfit before and after."""
     rows = []
-    for name, reported in reports.items():
-        line = summary(name, reported)
+    for name, content in reports.items():
+        line = summary(name, content)
         effects = line['effects']
         line['effects'] = ' '.join(f'{e["id"]}@{e["joint"]}' for e in effects)
         margins = [each['margin'] for each in effects]
@@ -188,12 +157,11 @@ def summary_table(reports: Mapping[str, Reported]) -> str:
     return _csv(SUMMARY, rows)
 
 
-def parameter_table(reports: Mapping[str, Reported]) -> str:
+def parameter_table(reports: Mapping[str, Content]) -> str:
     """Return one CSV line for each fitted parameter, bags beside each other in columns."""
     # A cell is empty where a recording does not show the parameter.
     columns: dict[tuple[str, str, str], dict[str, float]] = {}
-    for name, reported in reports.items():
-        content = reported.content()
+    for name, content in reports.items():
         for joint, estimates in content['parameters'].items():
             for parameter, estimate in estimates.items():
                 row = columns.setdefault((joint, 'plant', parameter), {})
@@ -220,11 +188,6 @@ def _largest(fits: Mapping[str, Mapping[str, float]]) -> float | None:
     return max((fit['rmse_over_noise'] for fit in fits.values()), default=None)
 
 
-def _write(reported: Reported, folder: Path) -> None:
-    for name, content in reported.files.items():
-        (folder / name).write_bytes(content)
-
-
 def _prepared(
     sources: Sequence[Sources], jobs: int, same_physics: bool, tell: Progress | None
 ) -> Sequence[Sources]:
@@ -240,10 +203,14 @@ def _prepared(
     return sources
 
 
-def _here[Found](
-    explain: Callable[[Sources], Found], sources: Sequence[Sources], jobs: int
-) -> Iterator[tuple[int, Found]]:
+def _as_they_come(
+    sources: Sequence[Sources], jobs: int, progress: Progress | None
+) -> Iterator[tuple[int, ExplainedCase]]:
+    """Explained cases with their places among the sources: several side by side."""
+    if len(sources) == 1:
+        yield 0, explained_case(sources[0], jobs, progress)
+        return
     with worker_pool(min(jobs, len(sources))) as pool:
-        futures = {pool.submit(explain, one): i for i, one in enumerate(sources)}
+        futures = {pool.submit(explained_case, one): i for i, one in enumerate(sources)}
         for future in as_completed(futures):
             yield futures[future], future.result()

@@ -131,7 +131,7 @@ def run(args: argparse.Namespace) -> int:
             progress=progress.step,
         )
     if args.json:
-        print_json([summary(name, reported) for name, reported in found.items()])
+        print_json([summary(name, content) for name, content in found.items()])
     return 0
 
 

@@ -229,10 +229,14 @@ REPORT_HTML = 'report.html'
 PLANT_YAML = 'plant.yaml'
 
 
-def write_report(case: ExplainedCase, folder: Path) -> None:
-    """Write report.json, report.html, plant.yaml and any next motion to a folder that exists."""
-    content = json.dumps(report_mapping(case), indent=1, allow_nan=False)
-    (folder / REPORT_JSON).write_text(content + '\n', encoding='utf-8')
+def write_report(case: ExplainedCase, folder: Path) -> dict[str, Any]:
+    """Write report.json, report.html, plant.yaml and any next motion to a folder that exists.
+
+    Returns what report.json says.
+    """
+    content = report_mapping(case)
+    text = json.dumps(content, indent=1, allow_nan=False)
+    (folder / REPORT_JSON).write_text(text + '\n', encoding='utf-8')
     (folder / REPORT_HTML).write_text(html_page(case), encoding='utf-8')
     save_plant(case.plant, folder / PLANT_YAML)
     if case.next_experiment is not None:
@@ -243,3 +247,4 @@ def write_report(case: ExplainedCase, folder: Path) -> None:
         still = (0.0,) * len(experiment.time)
         command = list(zip(*(columns.get(joint, still) for joint in joints), strict=True))
         write_command_file(folder / EXPERIMENT_FILE, experiment.time, command, joints)
+    return content
