@@ -5,8 +5,8 @@ some precision. For every safe motion of a library, the evidence that it is expe
 the law that is true over each of the others, refitted within that precision, is weighted by their
 probabilities (Box, Hill, Technometrics 9, 1967). The refit is linear (Buzzi-Ferraris, Forzatti,
 Chem. Eng. Sci. 38, 1983). Something that nobody has a name for stands beside them: it shows where a
-motion makes what no recording has made (as with no right model among those compared: Olofsson et
-al., arXiv 2304.07949).
+motion makes what no recording has made, so that an experiment is chosen where no model that is
+compared is right, too (expected discriminatory information: arXiv 2304.07949).
 """
 
 import math

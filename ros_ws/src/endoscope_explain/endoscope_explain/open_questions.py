@@ -22,6 +22,8 @@ from endoscope_explain.search.term import Term, starting_points
 
 MOST_LAWS = 3
 """Of a question that are fitted: the likeliest."""
+_LEAST = 1e-9
+"""Probability below which one does not matter."""
 BAND = 0.2
 """Relative freedom of the nominal numbers beside a law that is fitted anew."""
 
@@ -31,10 +33,11 @@ class OpenQuestion:
     """What a joint may lack, by its names."""
 
     joint: str
-    chances: Mapping[str, float]  # of each law that is left open, the one that is said first
+    # Probability of each law that is left open, of the one that was named first; none is 0.
+    chances: Mapping[str, float]
     contest: Contest
     duration: float  # of the recordings, s
-    effect: NamedEffect | None = None  # that is said; None where none is
+    effect: NamedEffect | None = None  # that was named; None where none was
 
     def decides(self, duration: float, decided: float) -> float:
         """Evidence in nats that is read as `decided` once a motion of `duration` s is made."""
@@ -63,7 +66,7 @@ class OpenQuestion:
 
 
 def open_questions(case: ExplainedCase) -> list[OpenQuestion]:
-    """What is left open beside each effect of a case, and at joints of which no more is said."""
+    """What is left open beside each effect of a case, and at joints where none, or no more, is."""
     explanation, found = case.explanation, []
     duration = case.recording.duration
     for effect in case.effects:
@@ -76,27 +79,27 @@ def open_questions(case: ExplainedCase) -> list[OpenQuestion]:
     return [each for each in found if len(each.chances) > 1]
 
 
-def _chances(contest: Contest, said: str) -> dict[str, float]:
+def _chances(contest: Contest, named: str) -> dict[str, float]:
     """The set that is left open, each statement by the first of its names that can be simulated."""
     chances: dict[str, float] = {}
-    for names, p in contest.left_open(said).items():
-        name = said if said in names else next((n for n in names if n in KNOWN), names[0])
-        chances[name] = chances.get(name, 0.0) + p
-    return dict(sorted(chances.items(), key=lambda each: each[0] != said))
+    for names, p in contest.left_open(named).items():
+        name = named if named in names else next((n for n in names if n in KNOWN), names[0])
+        chances[name] = chances.get(name, 0.0) + max(p, _LEAST)
+    return dict(sorted(chances.items(), key=lambda each: each[0] != named))
 
 
 def fitted_laws(case: ExplainedCase, question: OpenQuestion) -> dict[str, PlantDescription]:
     """A plant of each law that can be simulated, fitted to the recordings, by its name.
 
-    Without what is said there is nothing to compare: empty where the improved plant has it not.
+    Without what was named there is nothing to compare: empty where the improved plant lacks it.
     """
     recording, plant = case.recording, case.explanation.augmented
-    said, joint = next(iter(question.chances)), question.joint
+    named, joint = next(iter(question.chances)), question.joint
     there = {spec.id for spec in plant.effects if spec.joint == joint}
-    if question.effect is not None and said not in there:
+    if question.effect is not None and named not in there:
         return {}
-    laws = {said: plant}
-    for name in (n for n in question.chances if n not in {said, SOMETHING_ELSE, *there}):
+    laws = {named: plant}
+    for name in (n for n in question.chances if n not in {named, SOMETHING_ELSE, *there}):
         if len(laws) == MOST_LAWS:
             break
         law = _law(recording, case.explanation.nominal, plant, question, name)
@@ -112,7 +115,7 @@ def _law(
     question: OpenQuestion,
     name: str,
 ) -> PlantDescription | None:
-    """The plant with another law in the place of what is said; None where it cannot have it."""
+    """The plant with another law in the place of what was named; None where it cannot have it."""
     joint = question.joint
     if question.effect is not None:
         bare = without(plant, question.effect)
