@@ -8,7 +8,7 @@ from endoscope_core.physics import load_plant
 from endoscope_explain.explanation import Verdict
 from endoscope_explain.report.html_page import html_page
 from endoscope_explain.report.numbers import judged
-from endoscope_explain.report.sentences import told
+from endoscope_explain.report.sentences import terminal_text
 from endoscope_explain.report.writing import write_report
 
 FOUND = {
@@ -50,13 +50,13 @@ def test_what_is_found_is_located_and_reported_alike_everywhere(corpus, name, tm
     assert {e.id for e in load_plant(tmp_path / 'plant.yaml').effects} == set(effects)
     page = (tmp_path / 'report.html').read_text()
     assert html_page(case) == page
-    sentence, *_ = told(case).splitlines()
+    sentence, *_ = terminal_text(case).splitlines()
     assert sentence in page.replace('&#39;', "'")
 
 
 def test_an_effect_is_named_below_a_mistake_in_units_and_its_misfit_is_said(corpus):
     case = corpus.case('degrees')
-    assert 'As corrected: The recording shows load_cell_gain on bend_x.' in told(case)
+    assert 'As corrected: The recording shows load_cell_gain on bend_x.' in terminal_text(case)
     (mistake,) = case.audit.mistakes()
     assert mistake.evidence['misfit_corrected'] < 0.1 < 0.9 < mistake.evidence['misfit']
     assert '(misfit 100 % as recorded, ' in mistake.text

@@ -319,4 +319,4 @@ def test_another_recording_in_degrees_is_used_as_corrected_and_that_is_said(corp
     assert found.case.validation['refitted'][angle.name].ratio < 1.2
     inputs = read_inputs(Sources(bag, one_joint(), baseline=mistaken.path))
     assert inputs.baseline.bending.values[:, 0] == pytest.approx(angle.values)
-    assert said in inputs.said_of_others[0]
+    assert said in inputs.mistakes_of_others[0]

@@ -64,19 +64,19 @@ def answer_poses(
 ) -> MessageStream:
     """Poses that a tracker which reads these angles (N, J) in rad at these stamps would report."""
     # A pose at another time has no answer, nor has one at which the section would be bent by half a
-    # turn or more: a tracker cannot tell it from others.
+    # turn or more: a tracker cannot distinguish it from others.
     angles = np.zeros((len(stamp_ns), len(JOINT_NAMES)))
     for column, joint in enumerate(joints):
         angles[:, JOINT_NAMES.index(joint)] = bending[:, column]
     read = dict(zip(stamp_ns.tolist(), angles, strict=True))
-    told = [
+    seen = [
         (n, read[stamp])
         for n, stamp in enumerate(recorded.stamp_ns.tolist())
         if stamp in read and np.hypot(*read[stamp]) < np.pi
     ]
-    kept = np.array([n for n, _ in told], dtype=np.int64)
+    kept = np.array([n for n, _ in seen], dtype=np.int64)
     length = section_length(recorded)
-    poses = [tip_pose(angle, length) for _, angle in told]
+    poses = [tip_pose(angle, length) for _, angle in seen]
     return MessageStream(
         recorded.topic,
         POSE_STAMPED,
@@ -92,7 +92,7 @@ def answer_poses(
 
 
 def section_length(recorded: PoseSeries) -> float:
-    """Length in m of the bending section whose tip was recorded; 0 where no pose tells it."""
+    """Length in m of the bending section whose tip was recorded; 0 where no pose shows it."""
     # A circular arc of length L that turns by a has a chord of ``2 L sin(a / 2) / a``.
     chord = np.linalg.norm(recorded.position, axis=1)
     half_turn = np.arccos(np.clip(np.abs(recorded.orientation[:, 3]), 0.0, 1.0))
@@ -177,8 +177,8 @@ def write_answer(
 
     The new bag has the commands as they are, `motor/measured_js`, `wires/measured_js` and
     `slave/measured_js` at the stamps, under the namespace and with the times of receipt of the
-    recording, and says on `rig/kind` that it was simulated; a topic that the recording lacks comes
-    at its nominal rate. Only joints that are commanded answer. Where the recording has
+    recording, and states on `rig/kind` that it was simulated; a topic that the recording lacks
+    comes at its nominal rate. Only joints that are commanded answer. Where the recording has
     `tracker/measured_cp`, the answer has it too, at the stamps that it shares with
     `slave/measured_js`. Without a seed there is neither noise nor quantisation. InputError,
     BagError or FileError if the recording has no usable commands, its rig cannot be read, or `out`
@@ -234,7 +234,7 @@ def _answer_as_stamped(
     """Answer by the recording's own habit of stamping its readings."""
     # A rig that stamps the beginning of its cycle, commands and then reads, records at a stamp what
     # the command of that stamp has already moved. The shafts, whose encoders are the finest clock,
-    # tell which habit a recording has.
+    # show which habit a recording has.
 
     def answer(read_delay: float, at: AnswerStamps) -> Answer:
         return answer_commands(plant, commands.stamp_ns, commands.shaft, at, read_delay=read_delay)
@@ -265,7 +265,7 @@ def _times(recording: Recording, commands: BagCommands, suffix: str, rate: float
 
 
 def _kind(plant: PlantDescription, rig: Rig, commands: BagCommands) -> MessageStream:
-    """Make what says in the bag that it was simulated, and by what."""
+    """Make the entry of the bag that it was simulated, and by what."""
     kind = RigKind(
         Kind.SIMULATED,
         f'endoscope {version("endoscope_explain")}',

@@ -49,7 +49,7 @@ def combined_verdict(explanation: Explanation, audit: AuditReport) -> Verdict:
 
 def all_refuted(explanation: Explanation) -> bool:
     """Whether effects were named, and a second recording refutes all of them."""
-    # It says nothing of what acted at a time of the first one.
+    # It shows nothing of what acted at a time of the first one.
     refuted = [e.doubtful and not e.definition.traits.depends_on_time for e in explanation.effects]
     return bool(refuted) and all(refuted)
 
@@ -107,7 +107,7 @@ EXPERIMENT_FILE = 'next_experiment.csv'
 
 @dataclass(frozen=True)
 class NextExperiment:
-    """The motion that would tell rivals apart."""
+    """The motion that would decide between alternatives."""
 
     why: str
     separates: tuple[str, ...]  # ids
@@ -166,7 +166,7 @@ class ExplainedCase:
     validation_name: str = ''  # empty if none was given
     baseline_name: str = ''  # empty if none was given
     # What was mistaken in the baseline or the second recording.
-    said_of_others: tuple[str, ...] = ()
+    mistakes_of_others: tuple[str, ...] = ()
     next_experiment: NextExperiment | None = None
     # Whether the refitted plant does better when the measured motor drives it.
     cuts: tuple[ChainCut, ...] = ()

@@ -19,7 +19,7 @@ from endoscope_explain.search.judging import FALSE_ALARMS
 def confirmed_by(validation: Recording, explanation: Explanation) -> tuple[NamedEffect, ...]:
     """The named effects, doubtful where the second recording is not predicted better with them."""
     # Those of a joint are judged together, by the chance at which any term is taken; what is of a
-    # device that joints share, on all joints that show it. Of a joint that rests nothing is said.
+    # device that joints share, on all joints that show it. A joint that rests is left out.
     if not explanation.effects:
         return ()
     plants = {'refitted': explanation.refitted, 'augmented': explanation.augmented}

@@ -49,7 +49,7 @@ SAME_RIG = 0.03
 """Relative tolerance of a nominal parameter from one recording of a rig to the next."""
 ROUNDS = 3
 """In which both joints are explained beside each other, if they still change: the second one sees
-what the first one made of the other, and the third tells that it stands."""
+what the first one made of the other, and the third confirms that it stands."""
 
 Explained = tuple[JointSearch, Decision]
 
@@ -71,14 +71,14 @@ def explain_recording(
 
     What is `known` of a joint, names from other recordings of the rig, is fitted in any case.
     """
-    tell = progress or (lambda _: None)
+    report = progress or (lambda _: None)
     observations = tuple(o for o in with_held_noise(observe(recording, plant)) if o.channels)
     if not _is_enough(observations):
         return Explanation.without_fit(Verdict.INSUFFICIENT_DATA, plant)
-    tell('refitting the nominal plant')
+    report('refitting the nominal plant')
     well = plant
     if baseline is not None:
-        tell('searching what the baseline lacks')
+        report('searching what the baseline lacks')
         observations, well = _healthy(observations, baseline, plant, band, left_out, jobs)
         band = SAME_RIG
     observations, references = with_references(recording, observations, well, band, jobs)
@@ -93,8 +93,8 @@ def explain_recording(
     def stands(tried: JointSearch, angle: Array) -> bool:
         return given is None and stands_beside(tried, angle, left_out, jobs)
 
-    searches, decisions = _explained_together(references, explained, stands, jobs, tell)
-    tell('judging on what was held out')
+    searches, decisions = _explained_together(references, explained, stands, jobs, report)
+    report('judging on what was held out')
     effects = named(observations, decisions)
     of_joint = {o.joint: d for o, d in zip(observations, decisions, strict=True)}
     return Explanation(
@@ -158,13 +158,13 @@ def _explained_together(
     explained: Callable[[ReferenceFits], Explained],
     stands: Callable[[JointSearch, Array], bool],
     jobs: int,
-    tell: Progress,
+    report: Progress,
 ) -> tuple[list[JointSearch], list[Decision]]:
     """Explain each joint beside the other as that is explained, until no tracker sees a change."""
     # Where the nominal plant leaves no more than noise, nothing that the other joint does is
     # missing.
     joints = ' and '.join(refitted.model.observation.joint for refitted, _ in references)
-    tell(f'searching what is missing from {joints}')
+    report(f'searching what is missing from {joints}')
     found = parallel_map(explained, references, jobs)
     observations = [refitted.model.observation for refitted, _ in references]
     # How the other joint moved as each was explained: as in its nominal fit, at first.
@@ -179,7 +179,7 @@ def _explained_together(
         if stands(found[index][0], angle):
             continue
         joint = observations[index].joint
-        tell(f'searching what is missing from {joint} beside the other one as found')
+        report(f'searching what is missing from {joint} beside the other one as found')
         found[index] = explained(beside(references[index], of_other.chosen.fit))
     return [tried for tried, _ in found], [decision for _, decision in found]
 

@@ -55,9 +55,9 @@ class NominalEstimate(Estimate):
 
     nominal: float  # value in the plant file
     in_band: bool  # within the tolerance by which rigs differ from their description
-    # Whether the recording says more of it than was known before; else the interval is the prior's.
+    # Whether the recording adds to what was known of it; else the interval is the prior's.
     shown: bool = True
-    together_with: str = ''  # number without which the recording does not tell this one
+    together_with: str = ''  # number without which the recording does not show this one
     at_bound: bool = False  # as far as it may go: the recording asks for more
 
 
@@ -68,7 +68,7 @@ class NamedEffect:
     id: str  # in the catalogue
     joint: str
     parameters: Mapping[str, Estimate]  # by name
-    alternatives: tuple[str, ...] = ()  # ids that the data cannot tell from this one, nearest first
+    alternatives: tuple[str, ...] = ()  # ids that are confounded with this one, nearest first
     # each key has its meaning in `report.sentences.EVIDENCE`
     evidence: Mapping[str, float] = field(default_factory=dict)
     # How often names as clear as this one are right, as measured; NaN where that was not.
@@ -146,9 +146,9 @@ class UnknownTerm:
     expression: str  # the formula that comes nearest
     formula: Array  # (N,), its values
     formula_share: float  # share of what the function does that the formula does
-    formula_is_as_good: bool  # the recording does not tell it from the function
+    formula_is_as_good: bool  # the recording cannot distinguish it from the function
     explained: float = 1.0  # share of the excess misfit that the function removes
-    # other names that the recording does not tell from it, nearest first
+    # other names that are confounded with it, nearest first
     rivals: tuple[str, ...] = ()
     siblings: tuple[str, ...] = ()  # nearest effects of the catalogue, nearest first
     contest: Contest | None = None  # names that were tried in its place
@@ -181,7 +181,7 @@ class UnknownTerm:
 
 @dataclass(frozen=True, kw_only=True)
 class Explanation:
-    """Everything the engine says about one recording."""
+    """All that the engine concludes from one recording."""
 
     # Without the audit's findings: a caller that found a fault of the recording overrides it.
     verdict: Verdict
@@ -203,7 +203,7 @@ class Explanation:
     beyond_form: float = math.nan
     # how the final fits ended, by joint
     fitting: Mapping[str, Fitting] = field(default_factory=dict)
-    # By joint, what was tried where nothing, or nothing more, is said to be missing.
+    # By joint, what was tried where nothing, or nothing more, is found to be missing.
     contests: Mapping[str, Contest] = field(default_factory=dict)
 
     def left_open(self, joint: str) -> Posterior:
@@ -218,7 +218,7 @@ class Explanation:
 
     @staticmethod
     def without_fit(verdict: Verdict, plant: PlantDescription) -> 'Explanation':
-        """What is said where nothing may be fitted, or nothing can be."""
+        """The answer where nothing may be fitted, or nothing can be."""
         return Explanation(
             verdict=verdict,
             effects=(),

@@ -13,7 +13,7 @@ from endoscope_core.errors import InputError
 from endoscope_core.workers import worker_pool
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
-from endoscope_explain.report.sentences import told, verdict_sentence
+from endoscope_explain.report.sentences import terminal_text, verdict_sentence
 from endoscope_explain.report.writing import REPORT_HTML, provenance, write_report
 from endoscope_explain.shared_physics import physics_of_all
 
@@ -34,20 +34,20 @@ Say = Callable[[str], None]
 
 
 Content = Mapping[str, Any]
-"""What a report.json says."""
+"""What a report.json contains."""
 
 
 def explained_case(
     sources: Sources, jobs: int = 1, progress: Progress | None = None
 ) -> ExplainedCase:
     """Explain one bag; BagError if a recording cannot be used."""
-    tell = progress or (lambda _: None)
+    report = progress or (lambda _: None)
     inputs = read_inputs(sources)
     for note in inputs.audit.recording.notes:
-        tell(f'note: {note}')
+        report(f'note: {note}')
 
     def answered(case: ExplainedCase) -> None:
-        tell(f'found: {verdict_sentence(case)}')
+        report(f'found: {verdict_sentence(case)}')
 
     case = explain_case(inputs, jobs=jobs, progress=progress, answered=answered)
     made_from = provenance(sources.bag, sources.plant_file, sources.command)
@@ -101,7 +101,7 @@ def explain_bags(
             own.mkdir(exist_ok=alone)
             written[name] = write_report(case, own)
             if alone:
-                last = f'{told(case)}\nReport: {out / REPORT_HTML}'
+                last = f'{terminal_text(case)}\nReport: {out / REPORT_HTML}'
             else:
                 say(f'{len(written)}/{len(sources)} {name}: {verdict_sentence(case)}')
         in_order = {name: written[name] for name in names}
@@ -150,7 +150,7 @@ def summary_table(reports: Mapping[str, Content]) -> str:
         margins = [each['margin'] for each in effects]
         line['margins'] = ' '.join('-' if m is None else f'{m:.1f}' for m in margins)
         for key in ('nominal_rmse_over_noise', 'augmented_rmse_over_noise'):
-            # Where the rig moved too little to tell, nothing was fitted.
+            # Where the rig moved too little, nothing was fitted.
             line[key] = '' if line[key] is None else f'{line[key]:.2f}'
         line['runtime_s'] = f'{line["runtime_s"]:.1f}'
         rows.append([line[key] for key in SUMMARY])
@@ -189,13 +189,13 @@ def _largest(fits: Mapping[str, Mapping[str, float]]) -> float | None:
 
 
 def _prepared(
-    sources: Sequence[Sources], jobs: int, same_physics: bool, tell: Progress | None
+    sources: Sequence[Sources], jobs: int, same_physics: bool, report: Progress | None
 ) -> Sequence[Sources]:
     """Sources of which each can be explained for itself, after all of several were read."""
     if same_physics:
         if any(one.baseline is not None for one in sources):
             raise InputError('same physics and a baseline are mutually exclusive')
-        all_given = physics_of_all(sources, jobs, tell or (lambda _: None))
+        all_given = physics_of_all(sources, jobs, report or (lambda _: None))
         return [replace(o, given=g) for o, g in zip(sources, all_given, strict=True)]
     if len(sources) > 1:
         for one in sources:

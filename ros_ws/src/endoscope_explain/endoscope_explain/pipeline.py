@@ -60,7 +60,7 @@ class Sources:
     # By joint, names that other recordings of the rig gave or left open.
     known: Mapping[str, Collection[str]] = field(default_factory=dict)
     namespace: str | None = None  # of the rig's topics, where a bag has several rigs
-    rig: Rig | None = None  # what was recorded, where that is not what the bag says
+    rig: Rig | None = None  # what was recorded, where that is not what the bag names
     plant_file: Path | None = None  # where the plant was read from
     command: str = ''  # as it was typed
 
@@ -74,7 +74,7 @@ class Inputs:
     # As audited.
     baseline: Recording | None = None
     validation: Recording | None = None
-    said_of_others: tuple[str, ...] = ()  # what somebody took wrongly in these two, in words
+    mistakes_of_others: tuple[str, ...] = ()  # what somebody took wrongly in these two, in words
 
     @property
     def plant(self) -> PlantDescription:
@@ -92,7 +92,7 @@ def read_inputs(sources: Sources) -> Inputs:
 
     raw = read(sources.bag, sources.plant)
     plant = sources.plant.of_joints(raw.joints)
-    said: list[str] = []
+    mistaken: list[str] = []
 
     def second(what: str, path: Path | None) -> Recording | None:
         if path is None:
@@ -101,12 +101,12 @@ def read_inputs(sources: Sources) -> Inputs:
         refuse_other_joints(path, other.joints, sources.bag, raw.joints)
         audited = _audited(other, plant)
         mistakes = audited.mistakes()
-        said.extend(f'the {what} {other.name}: {f.text}; {f.remedy}' for f in mistakes)
+        mistaken.extend(f'the {what} {other.name}: {f.text}; {f.remedy}' for f in mistakes)
         return audited.recording
 
     baseline = second('baseline', sources.baseline)
     validation = second('second recording', sources.validate)
-    return Inputs(sources, _audited(raw, plant), baseline, validation, tuple(said))
+    return Inputs(sources, _audited(raw, plant), baseline, validation, tuple(mistaken))
 
 
 def _audited(raw: Recording, plant: PlantDescription) -> AuditReport:
@@ -135,12 +135,12 @@ def explain_case(
     """Explain a recording by `explain_recording`, or another engine that takes what it takes."""
     # The case is handed to `answered` once it is explained, before a next experiment is looked for.
     begun = time.monotonic()
-    tell = progress or (lambda _: None)
+    report = progress or (lambda _: None)
     sources, audit, validation = inputs.sources, inputs.audit, inputs.validation
     for finding in audit.findings:
-        tell(f'audit: {finding.text}; {finding.remedy}')
-    for other in inputs.said_of_others:
-        tell(f'audit: {other}')
+        report(f'audit: {finding.text}; {finding.remedy}')
+    for other in inputs.mistakes_of_others:
+        report(f'audit: {other}')
     # A fit's matrices are tall and narrow: threads would only wait for each other.
     with threadpool_limits(1, 'blas'):
         explanation = (engine or explain_recording)(
@@ -159,7 +159,7 @@ def explain_case(
         validation = with_isolated_marked(validation, plant)
         explanation = replace(explanation, effects=confirmed_by(validation, explanation))
     if explanation.fit:
-        tell('locating what was found')
+        report('locating what was found')
     recording = audit.recording
     case = ExplainedCase(
         recording=recording,
@@ -172,14 +172,14 @@ def explain_case(
         ladder={},
         validation_name='' if validation is None else validation.name,
         baseline_name='' if inputs.baseline is None else inputs.baseline.name,
-        said_of_others=inputs.said_of_others,
+        mistakes_of_others=inputs.mistakes_of_others,
         band=sources.band,
     )
     case = replace(case, places=_places(case), cuts=_cuts(case))
     if answered is not None:
         answered(case)
     if explanation.fit and not sources.quick:
-        tell('looking for the motion that decides what is left open')
+        report('looking for the motion that decides what is left open')
         case = replace(case, next_experiment=propose(case, what_is_asked(case), jobs))
     held_out, second = ladders(explanation, validation)
     return replace(case, ladder=held_out, validation=second, runtime_s=time.monotonic() - begun)

@@ -5,7 +5,7 @@ it, and a law of slightly another form moves it by hundreds of nats all the same
 read at a temperature, as is right where no model is (Grunwald, van Ommen, Bayesian Analysis 12,
 2017), and beside the names stand two more hypotheses: that nothing is missing, and that it is
 something that was not tried. What the temperature is in a recording like this one, how likely these
-two are, and how far a set must go so that it holds the truth as often as it says (Romano, Sesia,
+two are, and how far a set must go so that it holds the truth as often as it claims (Romano, Sesia,
 Candes, NeurIPS 2020) was measured on rigs whose truth is known.
 """
 
@@ -37,7 +37,7 @@ class Contest:
     names: tuple[tuple[str, ...], ...]
     gains: tuple[float, ...]  # logarithm of the evidence over that without any, in nats
     form: float  # evidence in nats by which an error of form may mislead between names
-    found: bool  # whether something is said to be missing
+    found: bool  # whether something is found to be missing
     beyond_form: float = 1.0  # what the chosen plant leaves over what another form leaves
 
     def without(self, others: Iterable[str]) -> 'Contest':
@@ -68,39 +68,39 @@ class Contest:
         chances = self.probabilities().tolist()
         return dict(sorted(zip(every, chances, strict=True), key=lambda each: -each[1]))
 
-    def left_open(self, said: str) -> Posterior:
-        """The part of it that holds the truth with 90 %, what is said of it in any case."""
+    def left_open(self, named: str) -> Posterior:
+        """The part of it that holds the truth with 90 %, what was named in any case."""
         left: Posterior = {}
         before = 0.0
         for names, p in self.posterior().items():
-            if before <= MASS or said in names:
+            if before <= MASS or named in names:
                 left[names] = p
             before += p
         return left
 
-    def alternatives(self, said: str) -> tuple[str, ...]:
-        """Names that are left open beside the one that is said, the likeliest first."""
-        names = [name for each in self.left_open(said) for name in each]
-        return tuple(n for n in names if n not in (said, NOTHING, SOMETHING_ELSE))
+    def alternatives(self, named: str) -> tuple[str, ...]:
+        """Names that are left open beside the one that was named, the likeliest first."""
+        names = [name for each in self.left_open(named) for name in each]
+        return tuple(n for n in names if n not in (named, NOTHING, SOMETHING_ELSE))
 
     @property
     def nameless(self) -> str:
-        """What is said where no name is: other numbers, if these were tried, or nothing."""
+        """The answer where no name is: other numbers, if these were tried, or nothing."""
         return OTHER_NUMBERS if any(OTHER_NUMBERS in n for n in self.names) else NOTHING
 
     def probability(
         self,
-        said: str,
+        named: str,
         weights: Sequence[float] | None = None,
         of_function: float = NAME_OF_FUNCTION,
     ) -> float:
-        """Probability of what is said."""
+        """Probability of what was named."""
         # A function at a place is mostly a form of the effect whose formula comes nearest.
         chances = self.probabilities(weights)
-        places = CATALOGUE[said].traits.families if said in CATALOGUE else ()
+        places = CATALOGUE[named].traits.families if named in CATALOGUE else ()
         return float(
             sum(
-                p if said in names else of_function * p * any(n in places for n in names)
+                p if named in names else of_function * p * any(n in places for n in names)
                 for names, p in zip(self.names, chances, strict=False)
             )
         )

@@ -31,7 +31,7 @@ DESIRED = 'slave/servo_jp'
 INPUTS = (SETPOINT, COMMAND, DESIRED)
 """The nearest to the shafts first.
 
-A setpoint says what the motor driver made of commands: which it obeyed, how it bounded them, and
+A setpoint shows what the motor driver made of commands: which it obeyed, how it bounded them, and
 the pose that it held once they had ended.
 """
 
@@ -55,7 +55,7 @@ class Series:
     # stamp.
     received: Array | None = None
     # (N,), messages that were published and not recorded directly before each sample; None where
-    # the recorder does not tell.
+    # the recorder does not count them.
     lost: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
@@ -116,7 +116,7 @@ class Recording:
     start_speed: Array | None = None  # (J,), speed of each motor then, rad/s; they stood where None
     restarts: tuple[Restart, ...] = ()  # of the recordings after the first one; see `takes`
     rig: Rig = field(default_factory=shipped_rig)  # gear, limits and time-outs of what was recorded
-    rig_kind: RigKind = field(default_factory=RigKind)  # what the recording says that it is of
+    rig_kind: RigKind = field(default_factory=RigKind)  # what the recording states that it is of
 
     def measured(self) -> dict[str, Series]:
         """Return the recorded measured series by their name in this class."""
@@ -180,7 +180,7 @@ def motor_name(joint: str) -> str:
 
 def signal_name(quantity: str, joint: str, wire: int = 0) -> str:
     """The name of one column of a series, for example `wires/measured_js:wire_x_pos`."""
-    # The three quantities of the motor share a topic and are told apart by a suffix:
+    # The three quantities of the motor share a topic and differ by a suffix:
     # `motor/measured_js:motor_x.position`.
     topic = QUANTITY_TOPICS[quantity]
     if quantity == 'tension':
@@ -195,7 +195,7 @@ STRAY_NS = 10_000_000_000
 
 
 def without_stray(series: JointStateSeries) -> tuple[JointStateSeries, list[str]]:
-    """Leave out messages stamped far from their receipt, unlike the others; and say so."""
+    """Leave out messages stamped far from their receipt, unlike the others, with a note of it."""
     delay = series.log_ns - series.stamp_ns
     far = np.abs(delay - np.median(delay)) > STRAY_NS
     # Where most are far, the clock runs at another rate, or counts in another unit: see the audit.
@@ -237,7 +237,7 @@ def require_common_time(path: object, topics: Sequence[JointStateSeries]) -> Non
 
 
 OPTIONAL = (WIRES,)
-"""Those of `WAIVABLE` that many rigs do not have: nobody has to say so."""
+"""Those of `WAIVABLE` that many rigs do not have: nobody has to waive them."""
 
 
 def recording_from_bag(

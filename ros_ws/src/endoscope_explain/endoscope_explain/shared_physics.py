@@ -20,7 +20,7 @@ from endoscope_explain.search.levels import search
 
 
 def physics_of_all(
-    sources: Sequence[Sources], jobs: int, tell: Callable[[str], None]
+    sources: Sequence[Sources], jobs: int, report: Callable[[str], None]
 ) -> list[GivenJoints]:
     """Effects that explain all recordings of a rig; BagError if one cannot be used."""
     recordings: list[dict[str, ReferenceFits]] = []
@@ -33,7 +33,7 @@ def physics_of_all(
                 refuse_other_joints(of.bag, recording.joints, first_bag, recordings[0])
             else:
                 most_effects, first_bag = of.most_effects, of.bag
-            tell(f'{recording.name}: refitting the nominal plant')
+            report(f'{recording.name}: refitting the nominal plant')
             _, references = with_references(
                 recording,
                 with_held_noise(observe(recording, one.plant)),
@@ -42,21 +42,21 @@ def physics_of_all(
                 jobs,
             )
             recordings.append(dict(zip(recording.joints, references, strict=True)))
-        return shared_effects(recordings, most_effects, jobs, tell)
+        return shared_effects(recordings, most_effects, jobs, report)
 
 
 def shared_effects(
     recordings: Sequence[Mapping[str, ReferenceFits]],
     most_effects: int,
     jobs: int,
-    tell: Callable[[str], None],
+    report: Callable[[str], None],
 ) -> list[GivenJoints]:
     """Choose effects for all recordings of a rig by the nominal fits of each joint."""
     given: list[dict[str, GivenPhysics]] = [{} for _ in recordings]
     for joint in recordings[0]:
-        tell(f'searching what {joint} lacks in all recordings')
+        report(f'searching what {joint} lacks in all recordings')
         references = [of_joint[joint] for of_joint in recordings]
-        tried = search(references, jobs, most_effects, tell=tell)
+        tried = search(references, jobs, most_effects, report=report)
         found = tried.found
         rivalries = {
             term.term.id: Rivalry(term.name, term.contest, term.margin)

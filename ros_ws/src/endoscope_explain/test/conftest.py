@@ -22,7 +22,6 @@ from endoscope_explain.explanation import (
 )
 from endoscope_explain.observe.predicted_signals import fits_by, view
 from endoscope_explain.pipeline import Inputs, Sources, explain_case
-from endoscope_explain.prediction_set import Contest
 from endoscope_explain.recording import Recording, Series
 
 # Tests import each other's recordings by name.
@@ -98,7 +97,6 @@ def stribeck_case(stribeck_recording):
         {name: Estimate(v, 0.9 * v, 1.1 * v, '-') for name, v in EXPLAINED.parameters.items()},
         ('viscous_friction',),
         {'gain': 120.0},
-        contest=Contest((('stribeck_friction',), ('viscous_friction',)), (4e3, 3999.0), 5.0, True),
     )
     parameters = {
         joint: {'capstan_exponent': NominalEstimate(0.9, 0.88, 0.92, '-', 0.9, True)}

@@ -103,7 +103,7 @@ def test_a_second_motion_tells_the_rivals_that_the_first_one_left(record, tmp_pa
     assert rig.played == [log.rounds[0].motion, log.rounds[1].motion]
     (spec,) = load_plant(out / PLANT).effects
     assert spec.parameters['bias_n'] == pytest.approx(0.3, abs=0.01)
-    assert 'not told from load_cell_crosstalk' in (out / LOG_MD).read_text()
+    assert 'confounded with load_cell_crosstalk' in (out / LOG_MD).read_text()
 
 
 def no_rig(motion, file, bag):
@@ -120,12 +120,20 @@ def both(tmp_path):
 
 
 @pytest.fixture
-def told(stribeck_case):
-    """A case in which no name has a rival."""
+def stribeck_case(stribeck_case):
+    """The case, with another law left open beside the one that is named."""
     (effect,) = stribeck_case.effects
-    return dataclasses.replace(
-        stribeck_case, effects=(dataclasses.replace(effect, alternatives=(), contest=None),)
-    )
+    tried = Contest((('stribeck_friction',), ('viscous_friction',)), (4e3, 3999.0), 5.0, True)
+    effects = (dataclasses.replace(effect, contest=tried),)
+    return dataclasses.replace(stribeck_case, effects=effects)
+
+
+@pytest.fixture
+def certain(stribeck_case):
+    """A case in which no name has an alternative."""
+    (effect,) = stribeck_case.effects
+    alone = dataclasses.replace(effect, alternatives=(), contest=None)
+    return dataclasses.replace(stribeck_case, effects=(alone,))
 
 
 def test_no_more_motions_are_asked_for_than_are_wanted(both, stribeck_case):
@@ -146,7 +154,7 @@ def test_no_more_motions_are_asked_for_than_are_wanted(both, stribeck_case):
     assert len(motions) == 3
 
 
-def test_a_fault_ends_it_with_what_is_known_and_it_is_continued(both, stribeck_case, told):
+def test_a_fault_ends_it_with_what_is_known_and_it_is_continued(both, stribeck_case, certain):
     def breaks_down(motion, file, bag):
         if bag.name == 'bag_2':
             raise RigStoppedError('FAULT: wire_x_pos at 61 N')
@@ -163,7 +171,7 @@ def test_a_fault_ends_it_with_what_is_known_and_it_is_continued(both, stribeck_c
 
     def explain(bags, known):
         explained.append([bag.name for bag in bags])
-        return told if len(bags) > 1 else stribeck_case
+        return certain if len(bags) > 1 else stribeck_case
 
     again = investigate(both, no_rig, explain)
     # The recording that broke off is used no more, and its motion is asked for again.
@@ -217,26 +225,26 @@ def test_names_that_were_given_or_left_open_are_known_to_the_next_explanation(bo
     assert known_then == [{}, {'bend_x': {'stribeck_friction', 'viscous_friction'}}]
 
 
-def test_numbers_that_an_effect_may_stand_for_are_asked_about(both, told, monkeypatch):
+def test_numbers_that_an_effect_may_stand_for_are_asked_about(both, certain, monkeypatch):
     monkeypatch.setattr(prediction_set, 'MASS', 1.0)
     tried = Contest((('other numbers',), ('gravity', 'load_of_angle')), (9.0, 9.0), 5.0, False)
     found = {'effects': (), 'verdict': Verdict.PARAMETERS_DIFFER}
-    explanation = dataclasses.replace(told.explanation, contests={'bend_x': tried}, **found)
-    left_open = dataclasses.replace(told, explanation=explanation, **found)
+    explanation = dataclasses.replace(certain.explanation, contests={'bend_x': tried}, **found)
+    left_open = dataclasses.replace(certain, explanation=explanation, **found)
     log = investigate(both, no_rig, lambda bags, known: left_open)
     (name,) = log.last_answer.names
     assert (name.id, name.joint, name.rivals) == ('other numbers', 'bend_x', tried.names[1])
     assert log.stopped is not Stop.ONE_CLASS
 
 
-def test_a_comparison_that_nobody_wants_leaves_what_is_known(both, told):
+def test_a_comparison_that_nobody_wants_leaves_what_is_known(both, certain):
     asked = []
 
     def declined(motion, file, bag, plant):
         asked.append((motion.words, file.name, plant))
         raise NotPlayedError('the motion was not wanted')
 
-    log = investigate(both, no_rig, lambda bags, known: told, track=declined)
+    log = investigate(both, no_rig, lambda bags, known: certain, track=declined)
     assert log.stopped is Stop.ONE_CLASS
     assert log.untracked == 'the motion was not wanted'
     ((words, file, plant),) = asked
@@ -246,8 +254,8 @@ def test_a_comparison_that_nobody_wants_leaves_what_is_known(both, told):
     assert 'not measured: the motion was not wanted' in (both.folder / LOG_MD).read_text()
 
 
-def test_what_is_at_its_end_is_not_begun_again(both, told):
-    assert investigate(both, no_rig, lambda bags, known: told).stopped is Stop.ONE_CLASS
+def test_what_is_at_its_end_is_not_begun_again(both, certain):
+    assert investigate(both, no_rig, lambda bags, known: certain).stopped is Stop.ONE_CLASS
     with pytest.raises(InputError, match='at its end: One class is left'):
         begun(both.folder, both.plant_file)
 

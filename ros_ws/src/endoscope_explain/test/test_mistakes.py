@@ -12,7 +12,7 @@ from endoscope_explain.explanation import Explanation, Verdict
 from endoscope_explain.observe.predicted_signals import fits_by, view
 from endoscope_explain.pipeline import Inputs, Sources, explain_case
 from endoscope_explain.report.html_page import html_page
-from endoscope_explain.report.sentences import told
+from endoscope_explain.report.sentences import terminal_text
 from endoscope_explain.report.writing import write_report
 
 ONE_JOINT = PlantDescription(joints={'bend_x': JointParameters()})
@@ -89,7 +89,7 @@ def test_what_is_left_of_a_mistaken_recording_is_explained_below_the_mistake(
     fit, of_right = mistaken.explanation.fit['refitted'], right.explanation.fit['refitted']
     assert set(of_right) - set(fit) == lost
     assert all(fit[signal].ratio < 1.2 for signal in fit)
-    first, second, *_ = told(mistaken).splitlines()
+    first, second, *_ = terminal_text(mistaken).splitlines()
     assert first.startswith(sentence)
     assert second.endswith(': The described plant predicts the recording of bend_x.')
     page = html_page(mistaken)
@@ -135,4 +135,4 @@ def test_where_nothing_moves_a_report_says_that_there_is_too_little(record, tmp_
     case = explain_case(inputs(plant, audit), jobs=1)
     assert case.verdict is Verdict.INSUFFICIENT_DATA
     write_report(case, tmp_path)
-    assert 'The recording cannot tell' in (tmp_path / 'report.html').read_text()
+    assert 'The recording cannot decide' in (tmp_path / 'report.html').read_text()

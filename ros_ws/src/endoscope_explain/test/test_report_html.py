@@ -31,7 +31,7 @@ from endoscope_explain.report.sentences import (
     before_and_after,
     next_step,
     physics_of,
-    told,
+    terminal_text,
     verdict_sentence,
 )
 from endoscope_explain.report.writing import report_mapping
@@ -176,7 +176,7 @@ def test_a_number_that_the_recording_does_not_show_has_words_in_place_of_an_inte
     page = text_of(html_page(case))
     assert 'joint_damping N m s/rad 0.003 this recording does not show it' in page
     assert 'motor_bandwidth rad/s 60 only together with motor_damping_ratio' in page
-    text = told(case)
+    text = terminal_text(case)
     assert 'This recording does not show joint_damping of bend_x.' in text
     said = 'It shows motor_bandwidth of bend_x only together with motor_damping_ratio.'
     assert text.count(said) == 1
@@ -298,7 +298,7 @@ def test_what_did_not_move_is_left_out(consistent):
     signals = judged(case, case.ladder)['nominal']
     assert signals
     assert all('_x' in signal for signal in signals)
-    assert 'wire_y_pos' not in told(case)
+    assert 'wire_y_pos' not in terminal_text(case)
     tables = html_page(case)
     assert 'wires:wire_x_pos' in tables
     assert 'wires:wire_y_pos' not in tables
@@ -315,7 +315,7 @@ def test_angles_are_in_degrees(page):
 def test_switches_are_said_in_words(stribeck_case):
     effect = named('load_cell_gain', gain=1.2, wire=1.0)
     case = dataclasses.replace(stribeck_case, effects=(effect,))
-    for text in (text_of(html_page(case)), told(case)):
+    for text in (text_of(html_page(case)), terminal_text(case)):
         assert 'the cell of the negative wire' in text
         assert 'gain' in text
         assert not re.search(r'\bwire 1\b', text)
@@ -323,14 +323,14 @@ def test_switches_are_said_in_words(stribeck_case):
 
 def test_what_does_nothing_is_no_number(stribeck_case):
     effect = named('contact', angle_rad=0.2, stiffness=0.01, exponent=1.0, loss_s=0.0)
-    text = told(dataclasses.replace(stribeck_case, effects=(effect,)))
+    text = terminal_text(dataclasses.replace(stribeck_case, effects=(effect,)))
     assert 'angle_deg 11.5 deg (10.3 to 12.6)' in text
     assert 'exponent' not in text
     assert 'loss_s' not in text
 
 
 def test_the_terminal_says_it_all(stribeck_case):
-    lines = told(stribeck_case).splitlines()
+    lines = terminal_text(stribeck_case).splitlines()
     assert lines[0] == 'The simulation leaves out stribeck_friction or viscous_friction on bend_x.'
     assert '    rise 0.8 (0.72 to 0.88)' in lines
     assert any(line.startswith('Where: transmission of bend_x, ') for line in lines)

@@ -11,7 +11,12 @@ from endoscope_explain.explanation import ChannelFit, NominalEstimate, Verdict
 from endoscope_explain.prediction_set import Contest
 from endoscope_explain.report.html_page import html_page
 from endoscope_explain.report.left_open import what_is_open
-from endoscope_explain.report.sentences import next_step, reservations, told, verdict_sentence
+from endoscope_explain.report.sentences import (
+    next_step,
+    reservations,
+    terminal_text,
+    verdict_sentence,
+)
 
 
 def test_a_number_at_a_bound_is_told_as_one_and_none_that_is_not_shown(stribeck_case):
@@ -74,7 +79,7 @@ def test_what_names_leave_over_and_what_differs_besides_is_said_under_the_headli
     text = text_of(html_page(case))
     assert stays in text
     assert besides in text
-    assert told(case).splitlines()[1:3] == [stays, besides]
+    assert terminal_text(case).splitlines()[1:3] == [stays, besides]
 
 
 def test_names_that_are_left_open_are_said_with_their_probabilities(stribeck_case, monkeypatch):

@@ -12,7 +12,7 @@ from endoscope_explain.compare import confirmed_by, ladders
 from endoscope_explain.explanation import Verdict
 from endoscope_explain.pipeline import Inputs, Sources, explain_case
 from endoscope_explain.report.html_page import html_page
-from endoscope_explain.report.sentences import told
+from endoscope_explain.report.sentences import terminal_text
 from endoscope_explain.report.writing import report_mapping
 
 DOUBT = (
@@ -50,7 +50,7 @@ def explained(stribeck_case, record):
 def test_what_predicts_the_second_recording_better_is_asserted(explained, concealed):
     case = explained(concealed)
     assert case.effects[0].evidence['second_p_value'] < 0.01
-    assert told(case).startswith('The simulation leaves out stribeck_friction')
+    assert terminal_text(case).startswith('The simulation leaves out stribeck_friction')
     assert 'in doubt' not in html_page(case)
 
 
@@ -60,7 +60,7 @@ def test_what_does_not_is_named_in_doubt_everywhere(explained):
     refitted, augmented = (case.validation[name] for name in ('refitted', 'augmented'))
     worst = max((s for s in refitted if '_x' in s), key=lambda s: refitted[s].ratio)
     assert augmented[worst].ratio > refitted[worst].ratio
-    for text in (told(case), html_page(case)):
+    for text in (terminal_text(case), html_page(case)):
         assert DOUBT in text
         assert 'stribeck_friction (in doubt)' in text
         assert 'leaves out stribeck_friction' not in text
@@ -80,7 +80,9 @@ def test_a_second_recording_does_not_refute_what_acted_at_a_time_of_the_first(
     load = replace(stribeck_case.effects[0], id='external_load', parameters={}, alternatives=())
     case = explained(adequate=False, effects=(load,))
     assert case.verdict is Verdict.MISSING_PHYSICS
-    assert 'better; it acted in this one alone, or stands for something else.' in told(case)
+    assert 'better; it acted in this one alone, or stands for something else.' in terminal_text(
+        case
+    )
 
 
 def test_a_name_that_survives_is_asserted_beside_one_in_doubt(explained, concealed, stribeck_case):
@@ -89,7 +91,7 @@ def test_a_name_that_survives_is_asserted_beside_one_in_doubt(explained, conceal
     case = explained(concealed, effects=(first, other), adequate=False)
     assert [effect.doubtful for effect in case.effects] == [False, True]
     assert case.verdict is Verdict.MISSING_PHYSICS
-    first_line, *rest = told(case).splitlines()
+    first_line, *rest = terminal_text(case).splitlines()
     assert 'gravity' not in first_line
     assert any(line.startswith('gravity on bend_y fits this recording, but') for line in rest)
 

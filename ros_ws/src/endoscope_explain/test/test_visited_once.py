@@ -6,7 +6,7 @@ import pytest
 
 from endoscope_explain.observe.revisits import Stroke
 from endoscope_explain.report.html_page import html_page
-from endoscope_explain.report.sentences import told
+from endoscope_explain.report.sentences import terminal_text
 from endoscope_explain.report.visited_once import MOTION, once_only, visited_once
 from endoscope_explain.report.writing import report_mapping
 
@@ -56,7 +56,7 @@ def sound(corpus):
 def test_page_and_terminal_say_it_in_one_line_of_each_joint(sound):
     (said,) = visited_once(sound)
     assert said.startswith('bend_x: no wide stroke was made twice.')
-    assert said in told(sound).splitlines()
+    assert said in terminal_text(sound).splitlines()
     page = html.unescape(html_page(sound))
     assert page.count(said) == 1
     assert page.index('held-out parts of this recording') < page.index(said)

@@ -110,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
             lambda bags, known: explain_together(bags, known, of, step),
             track=player.play,
             page=lambda log: page.page(log, of.folder),
-            say=say,
+            report=say,
         )
 
     with held(of.folder):

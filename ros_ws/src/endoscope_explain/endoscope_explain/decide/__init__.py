@@ -1,1 +1,1 @@
-"""What is said about a joint: names, rivals, and whether the explanation is adequate."""
+"""What is concluded of a joint: names, rivals, and whether the explanation is adequate."""

@@ -44,7 +44,7 @@ CHANGED = 0.04
 """Relative difference of a nominal parameter that is worth a verdict."""
 JOINTLY = float(norm.ppf(1.0 - 0.05 / len(FITTED_NOMINAL)) / norm.ppf(0.95))
 """Factor on intervals of all numbers of a joint that hold all of them in 90 % (Bonferroni): of as
-many that did not change, each with its own, one would mostly be said to differ."""
+many that did not change, each with its own, one would mostly seem to differ."""
 MOST = 0.5
 """Share of the misfit that names must explain where they leave more than another form would: with
 less, the main thing has no name."""
@@ -117,7 +117,7 @@ def verdict(
 ) -> Verdict:
     """The one word for what was found: by stages of effects and faults, and what else is known."""
     # What was mistaken in the recording itself comes first: the rest is about another recording
-    # than was given. Where the rig hardly moves nothing can be told. Missing physics wins over a
+    # than was given. Where the rig hardly moves nothing can be known. Missing physics wins over a
     # faulty sensor, that over a faulty recording, and any of them over differing parameters: these
     # always differ a little.
     found = set(stages)

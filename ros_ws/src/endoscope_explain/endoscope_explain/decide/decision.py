@@ -1,4 +1,4 @@
-"""From what was tried on one joint to what is said about it."""
+"""From what was tried on one joint to what is concluded of it."""
 
 from dataclasses import dataclass, replace
 from itertools import takewhile
@@ -41,7 +41,7 @@ class MissingTerm:
 
 @dataclass(frozen=True)
 class Decision:
-    """What is said about one joint."""
+    """What is concluded of one joint."""
 
     chosen: Candidate  # the joint with what is missing; the nominal plant where nothing is
     missing: tuple[MissingTerm, ...]  # in the order in which they were found

@@ -66,11 +66,11 @@ def _prior_precision(found: Fit) -> Array:
 
 
 BLOCK = 50
-"""Samples of a block whose mean tells slow misfit that single samples hide."""
+"""Samples of a block whose mean shows slow misfit that single samples hide."""
 LIMIT = 5.0
 """Standard deviations of the noise's own scatter that a mean square may exceed."""
 NOTABLE = 0.1
-"""Share of a wire's samples with more scatter than noise from which on it is said to slip."""
+"""Share of a wire's samples with more scatter than noise from which on it counts as slipping."""
 
 
 def excess(fit: Fit) -> dict[str, float]:

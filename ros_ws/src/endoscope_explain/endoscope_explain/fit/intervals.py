@@ -41,7 +41,7 @@ Array = NDArray[np.float64]
 STEPS = 8
 """Simulations in which the model is fitted to a rig of another form, whose numbers are its own."""
 FORMS = 19
-"""Rigs that say what another form leaves, and how far it moves numbers: 1 in 20 leaves more."""
+"""Rigs that show what another form leaves, and how far it moves numbers: 1 in 20 leaves more."""
 _SEED = 7
 _TINY = 1e-12
 
@@ -106,7 +106,7 @@ def reading(observation: JointObservation, residuals: Array) -> JointObservation
 
 
 SHOWN = math.sqrt(0.5)
-"""Deviation over the prior's up to which a recording says as much of a number as the prior does:
+"""Deviation over the prior's up to which a recording shows as much of a number as the prior does:
 their precisions add."""
 TOGETHER = math.sqrt(0.75)
 """Correlation from which on one number, were it known, would halve the other one's deviation."""
@@ -121,8 +121,8 @@ class Intervals:
     values: Array  # (n,)
     low: Array  # (n,)
     high: Array  # (n,)
-    shown: NDArray[np.bool_]  # (n,), whether the recording says more of it than the prior
-    # Number without which the recording does not tell this one; empty where it does.
+    shown: NDArray[np.bool_]  # (n,), whether the recording shows more of it than the prior
+    # Number without which the recording does not show this one; empty where it does.
     partners: tuple[str, ...]
 
 
@@ -135,7 +135,7 @@ def covariance(fit: Fit) -> Array:
 
 
 def _with_form(spread: Array, fit: Fit) -> Array:
-    """A fit's covariance (n, n) and what another form moves, as few rigs tell (Student's t)."""
+    """A fit's covariance (n, n) and what another form moves, as few rigs show (Student's t)."""
     if fit.moved_by_form is None:
         return spread
     scale = t.ppf(0.95, FORMS) / NINETY_PERCENT

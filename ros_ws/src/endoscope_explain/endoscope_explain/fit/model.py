@@ -78,7 +78,7 @@ CLOCK_RATE = showing(Symptom.CLOCK_RATE)
 TO_THE_END = 20
 """Steps of a fit, at most, that is not to stop on its way."""
 COARSE = 10
-"""Ticks in one of the simulations that only tell in which direction something goes."""
+"""Ticks in one of the simulations that only show in which direction something goes."""
 WIDE_STEP = 0.1
 """With sticking and slipping, the times of the slips jump with the parameters, and so do the
 residuals: a wide difference looks over the jumps."""

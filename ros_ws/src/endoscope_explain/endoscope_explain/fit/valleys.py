@@ -16,9 +16,9 @@ from endoscope_explain.fit.model import Fit, fit
 Array = NDArray[np.float64]
 
 ONSET = 'time_s'
-"""Name of the parameters that say when something begins."""
+"""Name of the parameters of when something begins."""
 RISE = 'duration_s'
-"""Name of the parameters that say how long it takes to begin."""
+"""Name of the parameters of how long it takes to begin."""
 COARSE_S, FINE_S, FINE_REACH_S = 0.5, 0.1, 0.6
 SHORT_S = 0.02
 REFIT_STEPS = 6
@@ -50,7 +50,7 @@ def _better(found: Fit, others: Iterable[Fit], weight: Array) -> Fit:
 
 def _begun_elsewhere(found: Fit, place: int, times: Array, weight: Array) -> Fit:
     if not len(times):
-        # The fit has it begin after the recording's end, where nothing tells one time from another.
+        # The fit has it begin after the recording's end, where all times are alike.
         return found
     slopes = found.jacobian * weight[:, None]
     span, _ = np.linalg.qr(np.delete(slopes, place, axis=1))

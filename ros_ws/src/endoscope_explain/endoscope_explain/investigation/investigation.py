@@ -1,4 +1,4 @@
-"""The loop: a motion, what all recordings say together, and the motion that would tell more."""
+"""The loop: a motion, what all recordings show together, and the motion that would show more."""
 
 import math
 import time
@@ -82,7 +82,7 @@ def investigate(
     *,
     track: PlayThrough | None = None,
     page: Page | None = None,
-    say: Callable[[str], None] = lambda _: None,
+    report: Callable[[str], None] = lambda _: None,
 ) -> Log:
     """Ask a rig for motions until it is explained; continue where a folder's log has ended.
 
@@ -93,7 +93,7 @@ def investigate(
     that, and so do Ctrl-C and any other error, which are raised again afterwards.
     """
     running = _Running(
-        investigation, logs.begun(investigation.folder, investigation.plant_file), page, say
+        investigation, logs.begun(investigation.folder, investigation.plant_file), page, report
     )
     try:
         first = commissioning(investigation.plant, investigation.rig)
@@ -127,7 +127,7 @@ class _Running:
     of: Investigation
     log: Log
     page: Page | None
-    say: Callable[[str], None]
+    report: Callable[[str], None]
     would_decide: str = ''  # what would, where no motion does
 
     def keep(self, log: Log) -> None:
@@ -153,13 +153,13 @@ class _Running:
         file = self.of.folder / asked.file
         write_command_file(file, motion.table.time, motion.table.angle, JOINTS)
         self.keep(replace(self.log, rounds=(*self.log.rounds, asked)))
-        self.say(f'{number}. {motion.words}. {motion.why}')
+        self.report(f'{number}. {motion.words}. {motion.why}')
         began = time.monotonic()
         play(motion, file, self.of.folder / asked.bag)
         self.keep(self.log.with_last(recorded=True, played_s=time.monotonic() - began))
 
     def answered(self, explain: Explain) -> Motion | Stop:
-        """Explain all recordings together, and say what to ask next, or why nothing."""
+        """Explain all recordings together, and work out what to ask next, or why nothing."""
         began = time.monotonic()
         whole = self.log.whole
         case = explain([self.of.folder / each.bag for each in whole], self.log.known())
@@ -167,12 +167,12 @@ class _Running:
         found = answer_of(case, time.monotonic() - began)
         self.keep(self.log.with_whole(answer=found))
         for line in logs.answered(found):
-            self.say(line)
+            self.report(line)
         if not _asks_more(case):
             return Stop.ONE_CLASS
         if len(whole) > self.of.experiments:
             return Stop.USED_UP
-        self.say('looking for the motion that tells more')
+        self.report('looking for the motion that decides more')
         began = time.monotonic()
         played = {(each.motion, each.joint) for each in whole}
         asked = what_is_asked(case)
@@ -186,15 +186,15 @@ class _Running:
         """See how the tip follows by the described and by the improved plant."""
         of = self.of
         motion = held_out(of.plant, of.rig)
-        self.say(f'{motion.words}, by the described plant and by the improved one. {motion.why}')
+        self.report(f'{motion.words}, by the described plant and by the improved one. {motion.why}')
         self.keep(with_tracking(self.log, of.folder, of.plant_file, motion, of.rig, track))
-        self.say(logs.tracking(self.log))
+        self.report(logs.tracking(self.log))
 
     def why_enough(self, stop: Stop) -> str:
         """Say why no further motion is asked for."""
         answer = self.log.last_answer
         rivals = [name for name in answer.names if name.rivals] if answer else []
-        left = ''.join(f' {r.id} is not told from {" or ".join(r.rivals)}.' for r in rivals[:1])
+        left = ''.join(f' {r.id} is confounded with {" or ".join(r.rivals)}.' for r in rivals[:1])
         wide = [name for name in answer.names if name.wide] if answer else []
         left += ''.join(f' How strong {w.id} is stays open: {w.strength}.' for w in wide)
         count = len(self.log.whole)
@@ -205,7 +205,7 @@ class _Running:
         )
         return {
             Stop.ONE_CLASS: f'{alone} {after}.',
-            Stop.NOTHING_TO_GAIN: f'no safe motion is expected to tell more {after}.{left}'
+            Stop.NOTHING_TO_GAIN: f'no safe motion is expected to decide more {after}.{left}'
             f'{self.would_decide and " "}{self.would_decide}',
             Stop.USED_UP: f'no more than {self.of.experiments} experiments were wanted.{left}',
         }[stop]
@@ -217,13 +217,13 @@ class _Running:
         if log.rounds and not log.rounds[-1].recorded and stop in logs.CUT_SHORT:
             log = log.with_last(ended=sentence)
         self.keep(log.ended(stop, sentence))
-        self.say(sentence)
+        self.report(sentence)
         for line in logs.times(self.log):
-            self.say(line)
+            self.report(line)
 
 
 def answer_of(case: ExplainedCase, seconds: float) -> Answer:
-    """What all recordings say together."""
+    """What all recordings show together."""
     fit = case.explanation.fit
     worst = [
         max((each.ratio for each in fit[name].values()), default=None) if name in fit else None
@@ -252,7 +252,7 @@ def _strength(effect: NamedEffect) -> str:
 
 
 def _beside_numbers(case: ExplainedCase) -> dict[str, tuple[str, ...]]:
-    """By joint, what may be missing where no more than other numbers is said to be."""
+    """By joint, what may be missing where no more than other numbers is found to be."""
     open_ones = {joint: case.explanation.instead(joint) for joint in case.explanation.contests}
     return {joint: names for joint, names in open_ones.items() if names}
 

@@ -49,7 +49,7 @@ class Name:
 
     id: str
     joint: str
-    rivals: tuple[str, ...]  # that the recordings do not tell from it, nearest first
+    rivals: tuple[str, ...]  # confounded with it, nearest first
     strength: str  # its first number with its 90 % interval, in words
     wide: bool = False  # whether that is known by no more than its order of magnitude
     left_open: str = ''  # the names that hold the truth with 90 %, with their probabilities
@@ -57,7 +57,7 @@ class Name:
 
 @dataclass(frozen=True)
 class Answer:
-    """What all recordings so far say together."""
+    """What all recordings so far show together."""
 
     verdict: str
     sentence: str
@@ -223,8 +223,8 @@ def in_sentences(log: Log) -> list[str]:
             lines += ['', *(f'- {line}' for line in answered(each.answer))]
     if log.stopped is not None:
         lines += ['', '## End', '', log.words]
-    if said := tracking(log):
-        lines += ['', '## Tracking', '', said]
+    if followed := tracking(log):
+        lines += ['', '## Tracking', '', followed]
     lines += ['', '## Times', '', *times(log)] if log.whole else []
     return lines
 
@@ -239,17 +239,17 @@ def tracking(log: Log) -> str:
     answer = log.last_answer
     names = {name.id for name in answer.names} if answer else set()
     read = sorted(names & KNOWN.keys() & {effect.id for effect, _ in LINKS[TRACKER.name]})
-    said = (
+    text = (
         'On a motion that is among no experiments the tip is off by '
         f'{described:.2g} deg (rms) where the described plant is inverted, '
         f'and by {improved:.2g} deg where the improved one is.'
     )
     if read:
-        said += (
+        text += (
             f' Both are as the tracker reads the tip, so that {" and ".join(read)} counts as an '
             'error of it.'
         )
-    return said
+    return text
 
 
 def times(log: Log) -> list[str]:
@@ -286,10 +286,10 @@ def answered(answer: Answer) -> Sequence[str]:
     lines = [answer.sentence]
     for name in answer.names:
         others = ' or '.join(name.rivals)
-        told = f'not told from {others}' if others else 'told from all others'
+        clear = f'confounded with {others}' if others else 'distinguished from all others'
         strength = f', {name.strength}' if name.strength else ''
         chances = f'; likely are {name.left_open}' if name.left_open else ''
-        lines.append(f'{name.id} of {name.joint}{strength}: {told}{chances}.')
+        lines.append(f'{name.id} of {name.joint}{strength}: {clear}{chances}.')
     lines += [f'Where: {place}.' for place in answer.places]
     if answer.described is not None and answer.improved is not None:
         lines.append(

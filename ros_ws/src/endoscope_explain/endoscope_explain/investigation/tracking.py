@@ -79,7 +79,7 @@ def with_tracking(
 ) -> Log:
     """The log with how the tip follows a motion by the described and by the improved plant.
 
-    Where that was not wanted or refused, it says so. RigStoppedError if the rig stops on the way.
+    Where that was not wanted or refused, the log notes it. RigStoppedError if the rig stops.
     """
     require_allowed(motion, rig)
     write_command_file(folder / FILE, motion.table.time, motion.table.angle, JOINTS)

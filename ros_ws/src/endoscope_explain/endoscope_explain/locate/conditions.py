@@ -128,7 +128,7 @@ def regime_in_words(excesses: Sequence[SignalExcess], states: Mapping[str, Mask]
 
 
 def information(energy: Array, active: Mask, within: Mask) -> float:
-    """What a state says about where the energy (N,), >= 0, is, in nats; 0 where it holds less."""
+    """What a state shows of where the energy (N,), >= 0, is, in nats; 0 where it holds less."""
     total = float(energy[within].sum())
     inside = active & within
     time_share = int(inside.sum()) / max(int(within.sum()), 1)
@@ -144,7 +144,7 @@ def information(energy: Array, active: Mask, within: Mask) -> float:
 
 def _best(energy: Array, states: Mapping[str, Mask], within: Mask, seed: int) -> str | None:
     scored = {words: information(energy, active, within) for words, active in states.items()}
-    # Of states that say as much, the last one is named.
+    # Of states that show as much, the last one is named.
     words, value = max(reversed(scored.items()), key=lambda item: item[1])
     if value < LEAST_NATS:
         return None

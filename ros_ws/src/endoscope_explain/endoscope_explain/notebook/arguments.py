@@ -1,4 +1,4 @@
-"""Arguments of a call, held to what its signature says."""
+"""Arguments of a call, held to its signature."""
 
 import inspect
 import re

@@ -25,7 +25,7 @@ from endoscope_explain.notebook.arguments import SCRATCH, checked
 from endoscope_explain.notebook.arrays import commands_from
 from endoscope_explain.notebook.signals import Signals, read
 from endoscope_explain.pipeline import Progress, Sources
-from endoscope_explain.report.sentences import told
+from endoscope_explain.report.sentences import terminal_text
 from endoscope_explain.report.writing import report_mapping, write_report
 from endoscope_explain.search.levels import MOST_EFFECTS
 
@@ -67,7 +67,7 @@ class Explained:
 
     @cached_property
     def report(self) -> dict[str, Any]:
-        """What `report.json` says."""
+        """What `report.json` contains."""
         return report_mapping(self.case)
 
     def save(self, folder: str | Path) -> Path:
@@ -83,7 +83,7 @@ class Explained:
         return Path(folder)
 
     def __repr__(self) -> str:
-        return f'{self.case.recording.name}: {self.verdict}. {told(self.case)}'
+        return f'{self.case.recording.name}: {self.verdict}. {terminal_text(self.case)}'
 
 
 @checked
@@ -109,7 +109,7 @@ def simulate(
     out : str or Path, optional
         Where to write the answer as a bag; without it, it is kept as long as the result is.
     rig : str, Path or Rig, optional
-        A rig.yaml, or what it describes; what the bag says of its rig by default, or as shipped.
+        A rig.yaml, or what it describes; the rig that the bag names by default, or as shipped.
 
     Returns
     -------
@@ -137,7 +137,7 @@ def explain(bag: Bag, plant: Plant, **options: Any) -> Explained: ...
 def explain(bag: Sequence[Bag], plant: Plant, **options: Any) -> list[Explained]: ...
 
 
-# The overloads tell one result from several, and leave the options to the signature below.
+# The overloads separate one result from several, and leave the options to the signature below.
 @checked  # type: ignore[misc]
 def explain(
     bag: Bag | Sequence[Bag],
@@ -172,7 +172,7 @@ def explain(
     namespace : str, optional
         Of the rig's topics, where a bag has several rigs.
     rig : str, Path or Rig, optional
-        A rig.yaml, or what it describes; what the bag says of its rig by default.
+        A rig.yaml, or what it describes; the rig that the bag names by default.
     band : float
         By which share the plant's parameters may differ from the rig's.
     effects : int
@@ -238,7 +238,7 @@ def _plant(plant: Plant) -> PlantDescription:
     if not isinstance(plant, PlantDescription):
         return load_plant(plant)
     try:
-        # What a plant.yaml could not say is refused before a recording is read.
+        # What a plant.yaml could not describe is refused before a recording is read.
         pack(plant)
         recording_faults(plant)
     except ValueError as error:

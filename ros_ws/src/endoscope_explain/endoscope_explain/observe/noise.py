@@ -19,7 +19,7 @@ SIGNIFICANT = 1.3
 QUIET = 0.1
 """Share of the recording in which nothing slips; a sensor worse than described is no motion."""
 STEPS_SEEN = 20
-"""Changes of a reading from which on its step is told: that half of so many continuous ones are
+"""Changes of a reading from which on its step is seen: that half of so many continuous ones are
 alike, within a hundredth, has a chance of 1e-15."""
 _SAME_READING = 1e-6
 """Relative difference of two readings that are one, written in single precision."""
@@ -54,7 +54,7 @@ def rounding_error(step: float, white: float) -> float:
 
 def step_read(values: Array) -> float:
     """Step in which readings (M,) come, one after the other; 0 where it is not seen."""
-    # A sensor may be coarser than its description says.
+    # A sensor may be coarser than described.
     change = np.abs(np.diff(values))
     change = change[change > _SAME_READING * np.max(np.abs(values), initial=0.0)]
     if len(change) < STEPS_SEEN:

@@ -98,7 +98,7 @@ class Channel:
 
     def predicted(self, outputs: Array, lead: float = 0.0, skew: float = 0.0) -> Array:
         """The analysis samples (M,) that simulated outputs (N, OUTPUTS) predict."""
-        # `lead` in [0, 1] is by how many ticks a reading is younger than its stamp says: a loop
+        # `lead` in [0, 1] is by how many ticks a reading is younger than its stamp: a loop
         # that stamps, commands and then reads has a lead of up to one tick. `skew` is by how much
         # the device's clock runs fast.
         return self.stamps.read(outputs[:, self.output], lead, skew)
@@ -306,7 +306,7 @@ WHITE = frozenset({'tension', 'bending', 'shaft_effort'})
 def with_held_noise(observations: tuple[JointObservation, ...]) -> tuple[JointObservation, ...]:
     """Scale the known noise of each kind of sensor by what is seen in holds."""
     # Coloured noise averages out less than white noise does, and a sensor may be worse than its
-    # description. Third differences of the readings in holds tell, without any model of the plant.
+    # description. Third differences of the readings in holds show it, without any model.
     # Sensors of one kind are taken together; where there is no hold, the description stands.
     squares: dict[str, list[Array]] = {}
     for observation in observations:

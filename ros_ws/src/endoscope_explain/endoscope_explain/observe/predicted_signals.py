@@ -95,7 +95,7 @@ def reading_lead(observations: tuple[JointObservation, ...], outputs: Array) -> 
 
 def view(recording: Recording, plants: Mapping[str, PlantDescription]) -> RecordedView:
     """Predict every signal of a recording by several plants."""
-    # The last one is taken for the best one: its motor tells when readings were taken.
+    # The last one is taken for the best one: its motor shows when readings were taken.
     best = list(plants.values())[-1]
     observations = observe(recording, best)
     begin = float(recording.command.time[0])

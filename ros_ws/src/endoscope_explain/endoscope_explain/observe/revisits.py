@@ -3,7 +3,7 @@
 A hysteresis loop has branches: where the tip is depends on the command, on which way it moves, and
 on where it last turned. A moment whose branch was passed before is a state seen twice, so that one
 visit can be fitted and the other one judged. What was visited once only was fitted, and no
-held-out sample says whether it would come again.
+held-out sample shows whether it would come again.
 """
 
 from dataclasses import dataclass

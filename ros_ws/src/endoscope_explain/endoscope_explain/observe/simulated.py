@@ -35,7 +35,7 @@ def simulate_joints(
     taken = []
     for part, (begin, end) in enumerate(pairwise(ends)):
         for j, own in enumerate(restarts if part else ()):
-            # Time, and what has crept or worn, goes on; the motor comes as this recording says.
+            # Time, and what has crept or worn, goes on; the motor comes as this recording has it.
             for angle in own[part - 1].way:
                 turn_to(states[j], histories[j], sheaths[j], parameters[j], flags[j], angle)
             states[j, MOTOR_SPEED] = own[part - 1].speed

@@ -89,7 +89,7 @@ def _function(term: UnknownTerm, columns: int) -> Plot:
     ]
     if term.formula_share >= LEAST_SHARE:
         colour = COLOUR['augmented']
-        # A constant is the plant's numbers as well, and no recording says how much of it is where.
+        # A constant is the plant's numbers as well, and no recording shows how much of it is where.
         level = np.median(term.values - term.formula)
         curves.append(Curve('formula', nodes, drawn(term.formula + level), colour, dash=(6.0, 4.0)))
     times = 'factor on it' if term.multiplies else 'factor'
@@ -159,8 +159,8 @@ def ladder_figure(ladder: Ladder) -> str:
                 continue
             # Beside each other, so that none is hidden where two models are as good.
             y = middle + 0.17 * ROW * (place - 0.5 * (len(compared) - 1))
-            said = f'{LABEL[name]}, {plain(signal)}: {digits(fit.ratio)} times the noise'
-            drawn.append(_marker(name, across(fit.ratio), y, said))
+            text = f'{LABEL[name]}, {plain(signal)}: {digits(fit.ratio)} times the noise'
+            drawn.append(_marker(name, across(fit.ratio), y, text))
     drawn.append(
         f'<text x="{WIDTH - RIGHT:g}" y="{bottom + 36:g}" text-anchor="end">'
         'rmse / noise on held-out samples</text>'
@@ -184,12 +184,12 @@ def _keys(compared: list[str]) -> str:
     return ''.join(drawn)
 
 
-def _marker(name: str, x: float, y: float, said: str) -> str:
+def _marker(name: str, x: float, y: float, text: str) -> str:
     colour = f'var(--{COLOUR[name]})'
     return (
         f'<path d="{MARKERS[name]}" transform="translate({x:.1f} {y:.1f})" stroke="{colour}" '
         f'stroke-width="1.5" fill="{colour}">'
-        f'<title>{escape(said)}</title></path>'
+        f'<title>{escape(text)}</title></path>'
     )
 
 

@@ -183,9 +183,9 @@ def _responsible(case: ExplainedCase) -> dict[str, list[str]]:
     for index, place in enumerate(places):
         verdict = case.verdict if index < len(mistaken) else case.rest
         word = 'unknown' if verdict is Verdict.UNKNOWN_PHYSICS else str(verdict)
-        said = f'{word.replace("_", " ")} ({place.joint})'
-        if said not in found.setdefault(place.stage, []):
-            found[place.stage].append(said)
+        text = f'{word.replace("_", " ")} ({place.joint})'
+        if text not in found.setdefault(place.stage, []):
+            found[place.stage].append(text)
     return found
 
 

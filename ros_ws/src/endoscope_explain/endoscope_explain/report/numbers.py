@@ -50,9 +50,9 @@ def shown(name: str, estimate: Estimate) -> Shown:
     numbers = [factor * v for v in (estimate.value, estimate.low, estimate.high)]
     spread = numbers[2] - numbers[1]
     if 0.0 < spread < math.inf:
-        # A hundredth of the interval says nothing.
+        # A hundredth of the interval means nothing.
         numbers[0] = round(numbers[0], 2 - math.ceil(math.log10(spread))) + 0.0
-    # As many digits as tell the ends of the interval apart.
+    # As many digits as distinguish the ends of the interval.
     count = next((n for n in range(3, 8) if len({digits(v, n) for v in numbers[1:]}) > 1), 3)
     value, low, high = (digits(v, count) for v in numbers)
     return Shown(name, value, low, high, unit)

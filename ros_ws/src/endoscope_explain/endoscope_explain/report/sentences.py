@@ -26,7 +26,7 @@ HEADLINES = {
     Verdict.SENSOR_FAULT: 'A sensor is at fault',
     Verdict.RECORDING_FAULT: 'The recording is at fault',
     Verdict.UNKNOWN_PHYSICS: 'Physics outside the catalogue',
-    Verdict.INSUFFICIENT_DATA: 'The recording cannot tell',
+    Verdict.INSUFFICIENT_DATA: 'The recording cannot decide',
 }
 EVIDENCE = {
     'gain': 'log evidence that it adds, in nats',
@@ -53,7 +53,7 @@ LEAST_SHARE = 0.5
 """A formula that does less of what the function does than this is no help."""
 MOST_NAMED = 2
 STAYS = 1.2
-"""Misfit over noise from which on a signal is said to stay off; of a thousand samples, noise alone
+"""Misfit over noise from which on a signal counts as off; of a thousand samples, noise alone
 leaves 1.05 once in a hundred."""
 
 
@@ -65,7 +65,7 @@ def verdict_sentence(case: ExplainedCase) -> str:
 
 def _sentence_of_rest(case: ExplainedCase) -> str:
     if case.rest is Verdict.INSUFFICIENT_DATA:
-        return 'The rig moves too little, or too little was recorded, to tell causes apart.'
+        return 'The rig moves too little, or too little was recorded, to distinguish causes.'
     if case.rest is Verdict.CONSISTENT:
         return f'The described plant predicts the recording of {_all(case.recording.joints)}.'
     if case.rest is Verdict.PARAMETERS_DIFFER:
@@ -96,9 +96,9 @@ def _not_doubted(case: ExplainedCase) -> list[str]:
 
 def physics_of(effect: NamedEffect) -> str:
     """What an effect does, and in which form."""
-    said = form(effect)
+    forms = form(effect)
     physics = f'{effect.definition.physics.rstrip(".")}.'
-    return f'{physics} Here: {", ".join(said)}.' if said else physics
+    return f'{physics} Here: {", ".join(forms)}.' if forms else physics
 
 
 def how_sure(effect: NamedEffect) -> str:
@@ -141,29 +141,30 @@ def before_and_after(case: ExplainedCase) -> str:
 def reservations(case: ExplainedCase) -> list[str]:
     """Say what else has to be known: of a corrected recording, and of what is left over."""
     mistakes = case.audit.mistakes()
-    said: list[str] = []
+    sentences: list[str] = []
     if len(mistakes) > 1:
-        said += [f'{_capital(finding.text)}.' for finding in mistakes[1:]]
+        sentences += [f'{_capital(finding.text)}.' for finding in mistakes[1:]]
     if mistakes:
         frozen = all(finding.id == 'frozen' for finding in mistakes)
         begin = 'Of what is not frozen' if frozen else 'As corrected'
-        said.append(f'{begin}: {_sentence_of_rest(case)}')
+        sentences.append(f'{begin}: {_sentence_of_rest(case)}')
     left_over = [] if case.explanation.adequate else case.audit.findings
     doubtful = [e for e in case.effects if e.doubtful]
     if len(doubtful) == len(case.effects) and case.rest is not Verdict.UNKNOWN_PHYSICS:
         # The first one is the verdict's sentence.
         doubtful = doubtful[1:]
-    said += [_doubt(case, effect) for effect in doubtful]
+    sentences += [_doubt(case, effect) for effect in doubtful]
     unlike = (f for f in left_over if f.id == 'unlike_the_plant')
-    said += [f'{_capital(finding.text)}. {_capital(finding.remedy)}.' for finding in unlike]
-    said += [f'{_capital(other)}. It was used as corrected.' for other in case.said_of_others]
+    sentences += [f'{_capital(finding.text)}. {_capital(finding.remedy)}.' for finding in unlike]
+    others = case.mistakes_of_others
+    sentences += [f'{_capital(other)}. It was used as corrected.' for other in others]
     if case.rest in (Verdict.CONSISTENT, Verdict.INSUFFICIENT_DATA):
-        return said
+        return sentences
     for joint in case.explanation.contests:
         left = case.explanation.left_open(joint)
         if any(name in KNOWN for names in left for name in names):
-            said.append(f'Whether {joint} lacks something more stays open: {in_words(left)}.')
-    said += [
+            sentences.append(f'Whether {joint} lacks something more stays open: {in_words(left)}.')
+    sentences += [
         f'The improved plant has {function_of(place)} on {joint} as well: it repairs no more than '
         'another form of the plant would leave.'
         for joint, place in case.explanation.repairs_form
@@ -174,15 +175,15 @@ def reservations(case: ExplainedCase) -> list[str]:
         more = ''
         if len(off) > 1:
             more = f', and {len(off) - 1} more {"are" if len(off) > 2 else "is"} off'
-        said.append(
+        sentences.append(
             f'{_capital(plain(signal))} is still off by {digits(ratio)} times its noise{more}. '
             'The form differs, or something else is missing too.'
         )
     besides = {key: e for key, e in differing(case).items() if not e.in_band}
     if besides and case.rest is not Verdict.PARAMETERS_DIFFER:
         shown_ones = [_one_differing(*key, e) for key, e in besides.items()]
-        said.append(f'Besides, {_all(shown_ones)}.')
-    return said
+        sentences.append(f'Besides, {_all(shown_ones)}.')
+    return sentences
 
 
 def _off(case: ExplainedCase) -> dict[str, float]:
@@ -193,7 +194,7 @@ def _off(case: ExplainedCase) -> dict[str, float]:
 
 
 def what_is_known(e: NominalEstimate) -> str:
-    """Say why a fitted number is none that the recording tells; empty where it is."""
+    """Why a fitted number is none that the recording shows; empty where it is."""
     if e.together_with:
         return f'only together with {e.together_with}'
     if not e.shown:
@@ -202,29 +203,29 @@ def what_is_known(e: NominalEstimate) -> str:
 
 
 def not_shown(case: ExplainedCase) -> list[str]:
-    """Say which numbers of the plant the recording does not tell; empty where it tells all."""
-    said = []
+    """Which numbers of the plant the recording does not show; empty where it shows all."""
+    sentences = []
     for joint, estimates in case.explanation.parameters.items():
         hidden = [n for n, e in estimates.items() if not (e.shown or e.together_with)]
         if hidden:
-            said.append(f'This recording does not show {_all(hidden)} of {joint}.')
+            sentences.append(f'This recording does not show {_all(hidden)} of {joint}.')
         pairs = {n: e.together_with for n, e in estimates.items() if e.together_with}
-        # Of two that name each other it is said once.
+        # Two that name each other make one sentence.
         once = [n for n, other in pairs.items() if pairs.get(other) != n or n < other]
-        said += [f'It shows {n} of {joint} only together with {pairs[n]}.' for n in once]
-    return said
+        sentences += [f'It shows {n} of {joint} only together with {pairs[n]}.' for n in once]
+    return sentences
 
 
 def fitting_sentences(case: ExplainedCase) -> list[str]:
     """Say how each joint's fit ended, and which numbers are at a bound."""
-    said = []
+    sentences = []
     for joint, each in case.explanation.fitting.items():
         how = 'converged' if each.converged else 'did not converge: its numbers are not final'
         text = f'The fit of {joint} {how} ({each.steps} steps; {each.reason}).'
         if each.at_bounds:
             text += f' At a bound: {_all(each.at_bounds)}.'
-        said.append(text)
-    return said
+        sentences.append(text)
+    return sentences
 
 
 def plain(signal: str) -> str:
@@ -240,10 +241,11 @@ def next_step(case: ExplainedCase) -> str:
         return f'{_capital(case.audit.mistakes()[0].remedy)}.'
     if case.next_experiment is not None:
         rivals = _all(case.next_experiment.separates)
-        return f'Have the master play next_experiment.csv: it tells {rivals} apart.'
-    untold = [(e.id, name) for e in case.effects for name in e.alternatives if name in KNOWN]
-    if untold:
-        return f'Run again without --quick for the motion that tells {" from ".join(untold[0])}.'
+        return f'Have the master play next_experiment.csv: it decides between {rivals}.'
+    confounded = [(e.id, name) for e in case.effects for name in e.alternatives if name in KNOWN]
+    if confounded:
+        pair = ' from '.join(confounded[0])
+        return f'Run again without --quick for the motion that distinguishes {pair}.'
     if any(e.doubtful for e in case.effects):
         return 'Explain both recordings with --same-physics: what is named then explains both.'
     if case.verdict is Verdict.CONSISTENT:
@@ -323,7 +325,7 @@ def _doubt(case: ExplainedCase, effect: NamedEffect) -> str:
 
 
 def _named(effect: NamedEffect) -> str:
-    """An effect, and the names that the recording cannot tell from it."""
+    """An effect, and the names that are confounded with it."""
     left = effect.left_open
     if len(left) > 1:
         return f'{in_words(left)} on {effect.joint}'
@@ -350,12 +352,12 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     )
 
 
-def told(case: ExplainedCase) -> str:
+def terminal_text(case: ExplainedCase) -> str:
     """Say what was found, in lines of which the first one is the verdict's sentence."""
     lines = [verdict_sentence(case), *reservations(case)]
     for effect in case.effects:
-        said = ' '.join(filter(None, (physics_of(effect), how_sure(effect))))
-        lines.append(f'  {label(effect)}: {said}')
+        text = ' '.join(filter(None, (physics_of(effect), how_sure(effect))))
+        lines.append(f'  {label(effect)}: {text}')
         lines += [f'    {one}' for one in numbers_of(effect)]
     if case.rest is Verdict.PARAMETERS_DIFFER:
         for (joint, name), e in differing(case).items():

@@ -28,12 +28,12 @@ def visited_once(case: ExplainedCase) -> list[str]:
         return []
     desired = commanded(recording) / recording.gear
     moving = moving_joints(recording)
-    said = [
+    sentences = [
         once_only(joint, strokes(desired[:, j]))
         for j, joint in enumerate(recording.joints)
         if joint in moving
     ]
-    return [text for text in said if text]
+    return [text for text in sentences if text]
 
 
 def once_only(joint: str, made: Sequence[Stroke]) -> str:

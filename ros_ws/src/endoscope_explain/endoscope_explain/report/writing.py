@@ -34,14 +34,14 @@ SCHEMA = 1
 KEYS = {
     'schema': f'version of this form, {SCHEMA}',
     'verdict': ', '.join(f'`{verdict}`' for verdict in Verdict),
-    'rig': 'what was recorded, as it says on `rig/kind`: `kind` (`simulated`, `emulated`, `real`, '
-    '`unknown`), `program`, `rig_sha256`, `plant` and `plant_sha256`; empty where it says nothing',
+    'rig': 'what was recorded, as stated on `rig/kind`: `kind` (`simulated`, `emulated`, `real`, '
+    '`unknown`), `program`, `rig_sha256`, `plant` and `plant_sha256`; empty if not stated',
     'where': 'most important first: `stage`, `joint`, `signals`, `intervals` in s from the first '
     'stamp, `regime` in words, `band_hz`',
     'effects': 'what was left out, most certain first: `id`, `joint`, `stage`, `probability`, '
     '`equation`, `source`, `parameters`, `alternatives`, `evidence`, and `left_open`, the set of '
     'names that holds the truth with 90 %: `names` that are one statement here, `probability`',
-    'left_open': 'by joint, the same where nothing, or nothing more, is said to be missing',
+    'left_open': 'by joint, the same where nothing, or nothing more, is found to be missing',
     'parameters': 'by joint and name: `nominal`, `value`, `low` and `high` of 90 %, `unit`, '
     '`in_band`, `shown`, `together_with`',
     'fit': 'by compared plant (`nominal`, `refitted`, `augmented`) and signal, held out: `rmse`, '
@@ -232,7 +232,7 @@ PLANT_YAML = 'plant.yaml'
 def write_report(case: ExplainedCase, folder: Path) -> dict[str, Any]:
     """Write report.json, report.html, plant.yaml and any next motion to a folder that exists.
 
-    Returns what report.json says.
+    Returns what report.json contains.
     """
     content = report_mapping(case)
     text = json.dumps(content, indent=1, allow_nan=False)

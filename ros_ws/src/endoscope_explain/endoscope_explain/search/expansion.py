@@ -80,8 +80,8 @@ def _terms(behind: Sequence[Background], left_out: tuple[str, ...]) -> list[tupl
     """What may be missing from the joint, of each recording."""
     if len(behind) == 1:
         return [addable(behind[0], left_out)]
-    # What was fitted to one motion is not told from time by another, nor time from what depends on
-    # a motion that is the same in all of them.
+    # Another motion does not distinguish what was fitted to one from time, nor time from what
+    # depends on a motion that is the same in all of them.
     always = repeat_one_motion([each.fit.model.observation for each in behind])
 
     def told_from_time(traits: Traits, observation: JointObservation) -> bool:

@@ -1,4 +1,4 @@
-"""The formula that comes nearest to a fitted function, in the metric of what the data say of it."""
+"""The formula nearest to a fitted function, in the metric of what the data show of it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -81,7 +81,7 @@ class Formula:
     expression: str  # of the place's symbol
     values: Array  # (NODES,), at the family's nodes
     share: float  # of what the function does, so much does the formula
-    as_good: bool  # whether the data do not tell it from the function, and a plant takes it
+    as_good: bool  # whether the data cannot distinguish it from the function, and a plant takes it
 
 
 def nearest_formula(found: FittedFunction) -> Formula:

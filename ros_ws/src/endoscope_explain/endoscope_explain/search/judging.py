@@ -15,7 +15,7 @@ from endoscope_explain.search.refit import Candidate
 
 FALSE_ALARMS = 0.025
 """Chance that rigs in which nothing is missing show as much, above which no term is added: 2 % are
-wanted, and 39 rigs tell no less."""
+wanted, and 39 rigs show no less."""
 
 
 class Judge(Protocol):
@@ -27,7 +27,7 @@ class Judge(Protocol):
         ...
 
     def stands_for(self, one: Candidate, top: Candidate) -> bool:
-        """Whether a candidate is not told from the best one."""
+        """Whether a candidate is confounded with the best one."""
         ...
 
     def formula_stands(self, formula: Candidate, function: Candidate, parent: Candidate) -> bool:
@@ -89,16 +89,16 @@ class BesideNullRigs:
 
 @dataclass(frozen=True)
 class InRecordingsLeftOut:
-    """By what the other recordings of a rig say of the one that is left out."""
+    """By what the other recordings of a rig show of the one that is left out."""
 
     form_is_worth: float = 0.0
 
     def stands_for(self, one: Candidate, top: Candidate) -> bool:
-        """Whether recordings that are left out do not tell a candidate from the best one."""
+        """Whether recordings that are left out confound a candidate with the best one."""
         return chance(top.foretold - one.foretold) > FALSE_ALARMS
 
     def formula_stands(self, formula: Candidate, function: Candidate, parent: Candidate) -> bool:
-        """Whether it is confirmed by itself: by how much less says how good a form it is."""
+        """Whether it is confirmed by itself: by how much less shows how good a form it is."""
         return self.confirms(formula, parent)
 
     def p_value(self, best: Candidate, parent: Candidate) -> float:
@@ -114,9 +114,9 @@ class InRecordingsLeftOut:
         return 'not in recordings that are left out'
 
     def ranked(self, found: tuple[Candidate, ...], parent: Candidate) -> tuple[Candidate, ...]:
-        """Candidates in the order of what can be said for them."""
-        # What is confirmed, and not told from the one that foretells most, goes by its evidence:
-        # leaving recordings out says what is no effect of the instrument, with few recordings, and
+        """Candidates in the order of what speaks for them."""
+        # What is confirmed, and confounded with the one that foretells most, goes by its evidence:
+        # leaving recordings out shows what is no effect of the instrument, with few recordings, and
         # not which of two effects it is.
         first = max(found, key=lambda c: (self.confirms(c, parent), float(np.sum(c.foretold))))
 

@@ -2,7 +2,7 @@
 
 At each level all terms are screened by linear algebra, the most promising are fitted in the
 simulator, and the evidence ranks them, functions and formulas alike. Rigs in which nothing is
-missing, run through the same screen, say how much evidence there is then.
+missing, run through the same screen, show how much evidence there is then.
 
 Several recordings of a rig whose tube is bent differently in each keep its physics, and only its
 parameters change. Explained one by one, two of them may well be given different names for the same
@@ -71,8 +71,8 @@ class Level:
     @property
     def best(self) -> Candidate:
         """The candidate to go on with."""
-        # Other numbers, then nominal physics, and then a formula stand where nothing tells the best
-        # one from them.
+        # Other numbers, then nominal physics, and then a formula stand where nothing
+        # distinguishes the best one from them.
         top = self.found[0]
 
         def first(candidates: Iterable[Candidate]) -> Candidate | None:
@@ -119,7 +119,7 @@ class Level:
         )
 
     def rivals(self) -> tuple[Candidate, ...]:
-        """Candidates that nothing tells from the first one."""
+        """Candidates that are confounded with the first one."""
         top = self.found[0]
         others = (c for c in self.found if c is not self.best)
         return tuple(c for c in others if c is top or self.judge.stands_for(c, top))
@@ -153,7 +153,7 @@ def search(
     depth: int = MOST_EFFECTS,
     left_out: tuple[str, ...] = (),
     known: Collection[str] = (),
-    tell: Callable[[str], None] = lambda _: None,
+    report: Callable[[str], None] = lambda _: None,
 ) -> JointSearch:
     """Search what is missing from a joint: `depth` terms at most beside nominal physics.
 
@@ -174,7 +174,7 @@ def search(
         changed = any(each.adds_nothing(each.best) for each in levels)
         level = _level(parents, jobs, left_out, known, other_numbers=not changed)
         levels.append(level)
-        tell(f'{joint}: {_told(level)}')
+        report(f'{joint}: {_in_words(level)}')
         if not level.is_found:
             break
         best = level.best
@@ -191,7 +191,7 @@ def search(
             for each in (best, *map(converged, others))
         ]
     if parents[0].candidate.is_noise:
-        tell(f'{joint}: only noise is left beside {_names(parents[0].candidate) or "nothing"}')
+        report(f'{joint}: only noise is left beside {_names(parents[0].candidate) or "nothing"}')
     return JointSearch(nominal, tuple(levels))
 
 
@@ -199,7 +199,7 @@ def _names(one: Candidate) -> str:
     return ', '.join(term.id for term in one.terms)
 
 
-def _told(level: Level) -> str:
+def _in_words(level: Level) -> str:
     """What came of a level, in words."""
     if not level.found:
         return 'no term moves anything'
@@ -276,7 +276,7 @@ def _foretelling(
     """Candidates, best first, that foretell what was held out, and those that do not."""
     # What leaves noise alone is what is missing. What leaves more is one of many forms that bend
     # towards it, and evidence is largest for those that bend most: a length that is free to change
-    # with time follows every branch of a loop, and says nothing of the next one.
+    # with time follows every branch of a loop, and shows nothing of the next one.
     if ranked[0].is_noise or len(first.fits) > 1:
         return ranked, ()
     worth = [c for c in ranked if c.evidence > first.evidence]

@@ -37,7 +37,7 @@ def stands_beside(tried: JointSearch, angle: Array, left_out: tuple[str, ...], j
 
 def _least(level: Level) -> float:
     """Gain by the screen from which on a term might be found in place of the level's best."""
-    # A fit may double what the screen says of it.
+    # A fit may double what the screen shows of it.
     return NEAR * max(level.gain(level.best), 0.0) if level.found else 0.0
 
 

@@ -27,7 +27,7 @@ _PER_CYCLE = 8.0
 
 
 def period_bounds(observation: JointObservation, state: Array) -> tuple[float, float]:
-    """Shortest and longest period that a recording tells of a state (N,); none where they cross."""
+    """Shortest and longest period that a recording shows of a state (N,); none where they cross."""
     slowest = min(observation.channels, key=lambda channel: len(channel.time))
     steps = np.abs(np.diff(_at(observation, state, slowest.time)))
     moving = steps[steps > 1e-3 * steps.max()] if len(steps) and steps.max() > 0.0 else steps

@@ -37,7 +37,7 @@ FINE = 2
 """Ticks in one of these simulations: on nine levels of six development cases, derivatives by single
 ticks gained 4 nats more of 299 and else 2 at most, at twice the cost."""
 ITERATIONS, ROUGH, SETTLED = 25, 1e-2, 1e-4
-"""Steps of a fit, at most, and the shares of the cost below which it tells and below which it
+"""Steps of a fit, at most, and the shares of the cost below which it decides and below which it
 stands."""
 
 
@@ -152,7 +152,7 @@ def term_of(seen: Sequence[TrialFit | None]) -> Term:
 
 
 def refit(seen: Sequence[TrialFit | None], without: Candidate) -> Candidate:
-    """Fit of a term from its trial fits, as far as tells which term is the best."""
+    """Fit of a term from its trial fits, as far as shows which term is the best."""
     # A recording that has no use for the term, None, stays without it.
     fits = [
         own if each is None else _refit(each, own)

@@ -62,7 +62,7 @@ def name_withheld(folder: Path, jobs: int, tell: Tell) -> Withheld:
     """Explain the whole loops of all tubes together, without the friction of the section."""
     fits, described = fitted_as_one([read(folder / f'{t}.txt').observation() for t in TUBES])
     references = list(zip(fits, described, strict=True))
-    tried = search(references, jobs, 1, (SECTION,), tell=tell)
+    tried = search(references, jobs, 1, (SECTION,), report=tell)
     curves = []
     for found in tried.levels[0].best.fits:
         for family, own in zip(

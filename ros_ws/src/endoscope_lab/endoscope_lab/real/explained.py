@@ -61,7 +61,7 @@ def explained_tubes(folder: Path, jobs: int, tell: Tell) -> Tubes:
         said.append(text)
         tell(text)
 
-    tried = search(list(zip(fits, described, strict=True)), jobs, MOST_EFFECTS, tell=heard)
+    tried = search(list(zip(fits, described, strict=True)), jobs, MOST_EFFECTS, report=heard)
     named = bool(tried.found.effects) or not tried.levels
     chosen = tried.found if named else tried.levels[-1].best
     explained = chosen.fits
