@@ -1,15 +1,20 @@
 """The demonstration's report as one self-contained page, with its plots."""
 
+from functools import partial
 from importlib.resources import files
 
 from endoscope_bringup.demo import sentences
 from endoscope_bringup.demo.procedure import MEANING, MOTIONS, Method
 from endoscope_bringup.demo.results import (
+    LARGEST,
+    RMSE,
+    Array,
     CalibrationOutcome,
     DemoResults,
     TrackingRun,
     ranking,
     table_rows,
+    values_of,
 )
 from endoscope_nodes.names import JOINTS
 from endoscope_pages import Curve, Plot, figure_html, html_table, render_page
@@ -22,37 +27,19 @@ COLOUR = {
 """Of what the tip did by each method, by its name in look.css."""
 
 LIMITS_DEG = (-70.0, 70.0)
-_TIME = 'time (s)'
-_ASKED = 'asked for (deg)'
+_COURSE = partial(Plot, x_label='time (s)')
+_LOOP = partial(Plot, x_label='asked for (deg)', loop=True, diagonal=True)
+_SQUARE = partial(_LOOP, columns=6, square=True, range_x=LIMITS_DEG, range_y=LIMITS_DEG)
 _DASHES = (6.0, 4.0)
 
 
 def loops_figure(results: DemoResults, tube: str, motion: str, best: Method) -> str:
     """Actual against desired angle of each joint, uncompensated and by one method."""
     runs = [results.run(tube, motion, method) for method in dict.fromkeys((Method.NONE, best))]
-    plots = [
-        Plot(
-            f"{joint}, tip's angle (deg)",
-            _ASKED,
-            tuple(
-                Curve(
-                    str(run.method),
-                    run.desired_deg[:, column],
-                    run.actual_deg[:, column],
-                    COLOUR[run.method],
-                    time=run.time,
-                )
-                for run in runs
-            ),
-            columns=6,
-            loop=True,
-            square=True,
-            range_x=LIMITS_DEG,
-            range_y=LIMITS_DEG,
-            diagonal=True,
-        )
-        for column, joint in enumerate(JOINTS)
-    ]
+    plots = []
+    for column, joint in enumerate(JOINTS):
+        curves = [_loop(str(r.method), r, column, COLOUR[r.method], r.time) for r in runs]
+        plots.append(_SQUARE(f"{joint}, tip's angle (deg)", curves=tuple(curves)))
     return figure_html(plots, sentences.of_loops(results, tube, motion, best))
 
 
@@ -60,79 +47,47 @@ def tracking_figure(results: DemoResults, tube: str, motion: str, methods: list[
     """Angle over time beside what was asked for, a row for each method, and below the errors."""
     runs = [results.run(tube, motion, method) for method in methods]
     plots = [_track(run, column, joint) for run in runs for column, joint in enumerate(JOINTS)]
-    compensated = [run for run in runs if run.method is not Method.NONE]
-    plots += [
-        Plot(
-            f'{joint}, errors of the compensated runs (deg)',
-            _TIME,
-            tuple(
-                Curve(str(run.method), run.time, run.error_deg[:, column], COLOUR[run.method])
-                for run in compensated
-            ),
-            columns=6,
-            height=130,
-        )
-        for column, joint in enumerate(JOINTS)
-    ]
+    for column, joint in enumerate(JOINTS):
+        title = f'{joint}, errors of the compensated runs (deg)'
+        errors = [
+            Curve(str(run.method), run.time, run.error_deg[:, column], COLOUR[run.method])
+            for run in runs
+            if run.method is not Method.NONE
+        ]
+        plots.append(_COURSE(title, curves=tuple(errors), columns=6, height=130))
     return figure_html(plots, sentences.of_tracking(results, tube, motion, methods))
 
 
 def _track(run: TrackingRun, column: int, joint: str) -> Plot:
-    asked = Curve(
-        'asked for', run.time, run.desired_deg[:, column], 'wanted', dash=_DASHES, width=1.6
-    )
-    tip = Curve(
-        str(run.method),
-        run.time,
-        run.actual_deg[:, column],
-        COLOUR[run.method],
-        to='asked for',
-    )
-    return Plot(f'{joint} (deg)', _TIME, (tip, asked), columns=6, height=110, range_y=LIMITS_DEG)
+    name, desired, actual = 'asked for', run.desired_deg[:, column], run.actual_deg[:, column]
+    asked = Curve(name, run.time, desired, 'wanted', dash=_DASHES, width=1.6)
+    tip = Curve(str(run.method), run.time, actual, COLOUR[run.method], to=name)
+    both = (tip, asked)
+    return _COURSE(f'{joint} (deg)', curves=both, columns=6, height=110, range_y=LIMITS_DEG)
+
+
+def _loop(
+    label: str, of: TrackingRun | CalibrationOutcome, column: int, colour: str, time: Array
+) -> Curve:
+    return Curve(label, of.desired_deg[:, column], of.actual_deg[:, column], colour, time=time)
 
 
 def calibration_figure(calibration: CalibrationOutcome) -> str:
     """Loop, and the tension of each wire, those of a joint together."""
+    title = f"tip's angle (deg), loop {calibration.backlash_deg:.0f}° wide"
     loops = tuple(
-        Curve(
-            joint,
-            calibration.desired_deg[:, column],
-            calibration.actual_deg[:, column],
-            colour,
-            time=calibration.tracked_at,
-        )
-        for column, (joint, colour) in enumerate(zip(JOINTS, ('curve-1', 'curve-2'), strict=True))
+        _loop(joint, calibration, column, f'curve-{column + 1}', calibration.tracked_at)
+        for column, joint in enumerate(JOINTS)
     )
-    plots = [
-        Plot(
-            f"tip's angle (deg), loop {calibration.backlash_deg:.0f}° wide",
-            _ASKED,
-            loops,
-            loop=True,
-            height=240,
-            diagonal=True,
-        )
+    plots = [_LOOP(title, curves=loops, height=240)]
+    tensions = (0.0, 1.05 * float(calibration.tension.max()))
+    wires = [
+        Curve(name, calibration.time, tension, name.replace('_', '-'))
+        for name, tension in zip(calibration.wires, calibration.tension.T, strict=True)
     ]
-    highest = 1.05 * float(calibration.tension.max())
     for number, joint in enumerate(JOINTS):
-        pair = range(2 * number, 2 * number + 2)
-        plots.append(
-            Plot(
-                f'{joint}, tension (N)',
-                _TIME,
-                tuple(
-                    Curve(
-                        calibration.wires[k],
-                        calibration.time,
-                        calibration.tension[:, k],
-                        f'wire-{"xy"[number]}-{("pos", "neg")[k % 2]}',
-                    )
-                    for k in pair
-                ),
-                height=130,
-                range_y=(0.0, highest),
-            )
-        )
+        pair = tuple(wires[2 * number : 2 * number + 2])
+        plots.append(_COURSE(f'{joint}, tension (N)', curves=pair, height=130, range_y=tensions))
     return figure_html(plots, sentences.of_calibration(calibration.facts))
 
 
@@ -162,12 +117,16 @@ def report_page(results: DemoResults, facts: dict[str, str]) -> str:
     return render_page(
         'endoscope_bringup',
         'demo/templates/report.html.j2',
+        filters={'degrees': sentences.degrees},
         picture=endoscope_picture(),
         headline=sentences.headline(rows),
-        wrong=sentences.what_is_wrong(rows),
-        helps=[(m, sentences.what_helps(rows, m)) for m in order if m is not Method.NONE],
-        paper=sentences.beside_the_paper(rows, Method.BOUC_WEN),
-        noise=sentences.beside_the_noise(results, best),
+        figures={
+            figure: {m: values_of(rows, figure, m) for m in Method} for figure in (RMSE, LARGEST)
+        },
+        shares={m: sentences.shares(rows, m) for m in Method},
+        method=Method,
+        of_the_paper=sentences.of_the_paper(),
+        noise_deg=results.noise_deg,
         cut=sentences.where_signals_were_cut(results, best),
         order=order,
         best=best,

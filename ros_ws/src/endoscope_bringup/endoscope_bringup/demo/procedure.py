@@ -93,29 +93,17 @@ TUBES = (
 )
 
 # First paper, Table 5: (tube, motion) -> RMSE none, RMSE proposed, backlash none, proposed.
-TABLE_5: dict[tuple[str, str], tuple[PaperFigure, PaperFigure, PaperFigure, PaperFigure]] = {
-    ('descending colon', 'periodic'): (
-        PaperFigure(18.08, 0.35),
-        PaperFigure(4.65, 0.13),
-        PaperFigure(50.02, 1.16),
-        PaperFigure(10.77, 0.48),
-    ),
-    ('descending colon', 'non_periodic'): (
-        PaperFigure(23.64, 0.08),
-        PaperFigure(6.34, 0.18),
-        PaperFigure(56.88, 1.26),
-        PaperFigure(11.47, 0.71),
-    ),
-    ('transverse colon', 'periodic'): (
-        PaperFigure(25.95, 0.60),
-        PaperFigure(6.99, 0.65),
-        PaperFigure(68.48, 0.77),
-        PaperFigure(17.05, 0.16),
-    ),
-    ('transverse colon', 'non_periodic'): (
-        PaperFigure(26.78, 0.13),
-        PaperFigure(6.33, 0.18),
-        PaperFigure(70.55, 0.51),
-        PaperFigure(17.68, 0.10),
-    ),
+TABLE_5 = {
+    (tube, motion): tuple(PaperFigure(*figure) for figure in figures)
+    for tube, of_tube in {
+        'descending colon': {
+            'periodic': ((18.08, 0.35), (4.65, 0.13), (50.02, 1.16), (10.77, 0.48)),
+            'non_periodic': ((23.64, 0.08), (6.34, 0.18), (56.88, 1.26), (11.47, 0.71)),
+        },
+        'transverse colon': {
+            'periodic': ((25.95, 0.60), (6.99, 0.65), (68.48, 0.77), (17.05, 0.16)),
+            'non_periodic': ((26.78, 0.13), (6.33, 0.18), (70.55, 0.51), (17.68, 0.10)),
+        },
+    }.items()
+    for motion, figures in of_tube.items()
 }

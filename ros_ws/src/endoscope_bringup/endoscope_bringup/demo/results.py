@@ -1,7 +1,7 @@
 """What was measured in the demonstration, beside the first paper's figures in one table."""
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +26,12 @@ COLUMN, HEADING = 14, 3
 """Width of a column and lines of a heading in the terminal's table."""
 
 
+def mean_over_joints(figure: Callable[..., float], desired: Array, actual: Array) -> float:
+    """The size of a figure of desired and actual angles (N, J), in their unit."""
+    pairs = zip(desired.T, actual.T, strict=True)
+    return float(np.mean([abs(figure(*pair)) for pair in pairs]))
+
+
 @dataclass(frozen=True)
 class CalibrationOutcome:
     """One calibration: what the wires said and what was made of it."""
@@ -41,7 +47,7 @@ class CalibrationOutcome:
     @property
     def backlash_deg(self) -> float:
         """Width of the loop at mid-height, the mean over the joints."""
-        return _mean_width(self.desired_deg, self.actual_deg)
+        return mean_over_joints(width_at_mid_height, self.desired_deg, self.actual_deg)
 
 
 @dataclass(frozen=True)
@@ -63,8 +69,7 @@ class TrackingRun:
     @property
     def rmse_deg(self) -> float:
         """Root of the mean square error, the mean over the joints."""
-        pairs = zip(self.desired_deg.T, self.actual_deg.T, strict=True)
-        return float(np.mean([tracking_rmse(*pair) for pair in pairs]))
+        return mean_over_joints(tracking_rmse, self.desired_deg, self.actual_deg)
 
     @property
     def largest_deg(self) -> float:
@@ -74,7 +79,7 @@ class TrackingRun:
     @property
     def backlash_deg(self) -> float:
         """Width of the loop at mid-height, the mean over the joints."""
-        return _mean_width(self.desired_deg, self.actual_deg)
+        return mean_over_joints(width_at_mid_height, self.desired_deg, self.actual_deg)
 
 
 @dataclass(frozen=True)
@@ -89,15 +94,7 @@ class DemoResults:
 
     def run(self, tube: str, motion: str, method: Method) -> TrackingRun:
         """The run of that tube, motion and method; KeyError if it was not made."""
-        for run in self.runs:
-            if (run.tube, run.motion, run.method) == (tube, motion, method):
-                return run
-        raise KeyError((tube, motion, method))
-
-
-def _mean_width(desired_deg: Array, actual_deg: Array) -> float:
-    pairs = zip(desired_deg.T, actual_deg.T, strict=True)
-    return float(np.mean([abs(width_at_mid_height(*pair)) for pair in pairs]))
+        return {(r.tube, r.motion, r.method): r for r in self.runs}[tube, motion, method]
 
 
 @dataclass(frozen=True)
@@ -126,20 +123,25 @@ def table_rows(results: DemoResults) -> list[TableRow]:
     for calibration in results.calibrations:
         tube = calibration.facts.tube
         for motion in MOTIONS:
-            runs = {method: results.run(tube, motion, method) for method in Method}
-            paper = TABLE_5[tube, motion]
-            figures = {
-                RMSE: ({m: run.rmse_deg for m, run in runs.items()}, *paper[:2]),
-                LARGEST: ({m: run.largest_deg for m, run in runs.items()}, None, None),
-                BACKLASH: ({m: run.backlash_deg for m, run in runs.items()}, *paper[2:]),
-            }
-            rows += [TableRow(tube, MOTION_TITLE[motion], f, *x) for f, x in figures.items()]
+            rmse_none, rmse, width_none, width = TABLE_5[tube, motion]
+            for figure, key, *paper in (
+                (RMSE, 'rmse_deg', rmse_none, rmse),
+                (LARGEST, 'largest_deg', None, None),
+                (BACKLASH, 'backlash_deg', width_none, width),
+            ):
+                values = {m: getattr(results.run(tube, motion, m), key) for m in Method}
+                rows.append(TableRow(tube, MOTION_TITLE[motion], figure, values, *paper))
     return rows
 
 
 def of_figure(rows: Sequence[TableRow], figure: str) -> list[TableRow]:
     """The rows of one figure."""
     return [row for row in rows if row.figure == figure]
+
+
+def values_of(rows: Sequence[TableRow], figure: str, method: Method) -> list[float]:
+    """One figure in degrees by one method, in each tube and motion."""
+    return [row.values[method] for row in of_figure(rows, figure)]
 
 
 def ranking(rows: Sequence[TableRow]) -> list[Method]:

@@ -5,16 +5,23 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_bringup.demo.procedure import MOTION_TITLE, MOTIONS, CalibrationFacts, Method
+from endoscope_bringup.demo.procedure import (
+    MOTION_TITLE,
+    MOTIONS,
+    TABLE_5,
+    CalibrationFacts,
+    Method,
+)
 from endoscope_bringup.demo.results import (
     BACKLASH,
-    LARGEST,
     RMSE,
     DemoResults,
     TableRow,
     TrackingRun,
+    mean_over_joints,
     of_figure,
     ranking,
+    values_of,
 )
 from endoscope_core.metrics import tracking_rmse
 from endoscope_core.signals import motion_by_name
@@ -25,53 +32,28 @@ Array = NDArray[np.float64]
 LEAST_CUT_DEG = 0.1
 
 
+def shares(rows: Sequence[TableRow], method: Method) -> str:
+    """What a method leaves of the uncompensated RMSE."""
+    return _percent([row.left(method) for row in of_figure(rows, RMSE)])
+
+
+def degrees(values: float | Sequence[float]) -> str:
+    """From the least to the greatest of some angles, or one."""
+    return f'{_range(np.atleast_1d(values))}°'
+
+
 def headline(rows: Sequence[TableRow]) -> str:
     """What was wrong and what became of it, in one sentence without its stop."""
     best = ranking(rows)[0]
-    widths = [row.values[Method.NONE] for row in of_figure(rows, BACKLASH)]
-    wrong = f'The tip lags: a loop {_degrees(widths)} wide opens'
+    wrong = f'The tip lags: a loop {degrees(values_of(rows, BACKLASH, Method.NONE))} wide opens'
     if best is Method.NONE:
         return f'{wrong}, and no compensation makes the error smaller'
-    return f'{wrong}; {best} leaves {_shares(rows, best)} of the error'
+    return f'{wrong}; {best} leaves {shares(rows, best)} of the error'
 
 
-def what_is_wrong(rows: Sequence[TableRow]) -> str:
-    """How far an uncompensated tip is from where it shall be."""
-    rmse = [row.values[Method.NONE] for row in of_figure(rows, RMSE)]
-    largest = max(row.values[Method.NONE] for row in of_figure(rows, LARGEST))
-    return (
-        f'Uncompensated, the tip is {_degrees(rmse)} (RMSE) and up to {_degree(largest)} away from '
-        'where it was asked to be.'
-    )
-
-
-def what_helps(rows: Sequence[TableRow], method: Method) -> str:
-    """What a method leaves."""
-    rmse = [row.values[method] for row in of_figure(rows, RMSE)]
-    largest = max(row.values[method] for row in of_figure(rows, LARGEST))
-    return (
-        f'leaves {_shares(rows, method)} of the uncompensated RMSE: {_degrees(rmse)}, and at most '
-        f'{_degree(largest)} at any instant.'
-    )
-
-
-def beside_the_paper(rows: Sequence[TableRow], method: Method) -> str:
-    """What a method leaves beside what the first paper's compensator leaves on its rig."""
-    papers = [
-        row.paper_proposed.mean / row.paper_none.mean
-        for row in of_figure(rows, RMSE)
-        if row.paper_none is not None and row.paper_proposed is not None
-    ]
-    return (
-        f"The first paper's compensator leaves {_percent(papers)} of the RMSE on its rig; its "
-        f'method leaves {_shares(rows, method)} here.'
-    )
-
-
-def beside_the_noise(results: DemoResults, method: Method) -> str:
-    """What a method leaves beside the noise of the tracker."""
-    left = _degrees([run.rmse_deg for run in results.runs if run.method is method])
-    return f"The tracker's noise alone is {results.noise_deg:.2f}° RMSE; {method} leaves {left}."
+def of_the_paper() -> str:
+    """What the first paper's compensator leaves of the RMSE on its rig."""
+    return _percent([proposed.mean / none.mean for none, proposed, *_ in TABLE_5.values()])
 
 
 def where_signals_were_cut(results: DemoResults, best: Method) -> list[str]:
@@ -87,7 +69,7 @@ def where_signals_were_cut(results: DemoResults, best: Method) -> list[str]:
                 continue
             none = _whole_rmse(results.run(facts.tube, motion, Method.NONE))
             cuts.append(
-                f'{MOTION_TITLE[motion]} by up to {_degree(cut.max())}, '
+                f'{MOTION_TITLE[motion]} by up to {degrees(cut.max())}, '
                 f'{100 * np.mean(cut >= LEAST_CUT_DEG):.0f} % of the time'
             )
             uncut.append(f'{_whole_rmse(run):.2f}° of {none:.2f}°')
@@ -132,13 +114,11 @@ def of_calibration(facts: CalibrationFacts) -> str:
 
 
 def _whole_signal(run: TrackingRun) -> Array:
-    motion = motion_by_name(run.motion)
-    return np.degrees(motion.sample(run.time)[0])
+    return np.degrees(motion_by_name(run.motion).sample(run.time)[0])
 
 
 def _whole_rmse(run: TrackingRun) -> float:
-    pairs = zip(_whole_signal(run).T, run.actual_deg.T, strict=True)
-    return float(np.mean([tracking_rmse(*pair) for pair in pairs]))
+    return mean_over_joints(tracking_rmse, _whole_signal(run), run.actual_deg)
 
 
 def _reach(facts: CalibrationFacts) -> str:
@@ -148,22 +128,10 @@ def _reach(facts: CalibrationFacts) -> str:
     return ', '.join(f'{joint} {way}' for joint, way in zip(JOINTS, ranges, strict=True))
 
 
-def _shares(rows: Sequence[TableRow], method: Method) -> str:
-    return _percent([row.left(method) for row in of_figure(rows, RMSE)])
-
-
 def _percent(shares: Sequence[float]) -> str:
     return f'{_range([100 * share for share in shares])} %'
 
 
-def _degrees(values: Sequence[float]) -> str:
-    return f'{_range(values)}°'
-
-
-def _degree(value: float) -> str:
-    return _degrees([value])
-
-
-def _range(values: Sequence[float]) -> str:
+def _range(values: Sequence[float] | Array) -> str:
     low, high = (f'{x:.0f}' if x >= 9.95 else f'{x:.1f}' for x in (min(values), max(values)))
     return low if low == high else f'{low} to {high}'

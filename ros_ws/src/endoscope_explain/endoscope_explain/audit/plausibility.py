@@ -9,15 +9,24 @@ and shapes within those tolerances, or into what no mistake explains.
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
-from math import exp, inf, log, pi
+from functools import cache
+from math import exp, log, pi
 
 import numpy as np
 
-from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.description import PlantDescription, SensorParameters
 from endoscope_core.physics.on_stamps import hold_on_ticks
 from endoscope_core.physics.simulator import LARGEST_COMMAND, TICK, simulate
-from endoscope_explain.audit.criteria import DERIVED
-from endoscope_explain.audit.misfit import LONGEST_S, PERIOD_S, Bounds, Moments
+from endoscope_explain.audit.finding import Column
+from endoscope_explain.audit.misfit import (
+    FOLLOWS,
+    LONGEST_S,
+    PERIOD_S,
+    SCALES,
+    USUAL,
+    WORTH,
+    Moments,
+)
 from endoscope_explain.audit.misreading import (
     CONVERTER_BITS,
     KINDS,
@@ -26,13 +35,25 @@ from endoscope_explain.audit.misreading import (
     misreadings,
     scaled,
 )
-from endoscope_explain.audit.standing_still import must_move
 from endoscope_explain.recording import MOVES_RAD, Array, Recording, Series
 
-TURN_RAD = 2.0 * pi
-"""No section bends further, from one side to the other."""
 MOST = 1.0
 """Misfit of what has nothing in common."""
+NOISES = 10.0
+"""Of a sensor, by which a signal must move for it not to stand still."""
+NORMAL_MEDIAN = 0.6745
+"""Median of the size of normal noise, in its rms."""
+
+
+def sensor_noise(sensors: SensorParameters) -> dict[str, float]:
+    """Noise, or step where that is more, of each measured quantity in its own unit."""
+    return {
+        'shaft_position': 2.0 * pi / sensors.encoder_counts,
+        'shaft_velocity': sensors.velocity_resolution,
+        'shaft_effort': max(sensors.effort_noise, sensors.effort_resolution),
+        'tension': max(sensors.load_cell_noise, sensors.load_cell_resolution),
+        'bending': sensors.tracker_noise,
+    }
 
 
 @dataclass(frozen=True)
@@ -45,9 +66,10 @@ class Way:
     # By how much larger or smaller they are than simulated, in what rigs usually differ by.
     size: float
 
-    def against(self, worth: float) -> float:
-        """Minus the logarithm of its likelihood where a column is worth so many samples."""
-        return worth * self.misfit + self.size
+    @property
+    def against(self) -> float:
+        """Minus the logarithm of its likelihood."""
+        return WORTH * self.misfit + self.size
 
 
 class Comparison:
@@ -58,97 +80,94 @@ class Comparison:
     ) -> None:
         self._plant, self._rig = plant, recording.rig
         begin, end = _span(recording)
-        self.grid = np.arange(begin, end, PERIOD_S)
+        self._grid = np.arange(begin, end, PERIOD_S)
         self._held = hold_on_ticks(
             np.maximum(recording.command.time - begin, 0.0),
             recording.command.values,
-            len(self.grid) * round(PERIOD_S / TICK),
+            len(self._grid) * round(PERIOD_S / TICK),
         )
-        self.measured = {
-            quantity: _on_grid(series, self.grid, quantity == 'bending')
-            for quantity, series in recording.measured().items()
-            if quantity not in leave_out
-        }
-        self._scatter = {
-            quantity: _scatter(recording.measured()[quantity]) for quantity in self.measured
-        }
+        series = {q: s for q, s in recording.measured().items() if q not in leave_out}
+        self._measured = {q: _on_grid(s, self._grid, q == 'bending') for q, s in series.items()}
+        self._scatter = {q: _scatter(s) for q, s in series.items()}
+        self._noise = sensor_noise(plant.sensors)
         self._readings = {
-            quantity: tuple(self._misreadings(quantity, values.shape[1]))
-            for quantity, values in self.measured.items()
+            q: tuple(misreadings(q, plant, self._rig.joints.gear, values.shape[1]))
+            for q, values in {'command': self._held, **self._measured}.items()
         }
-        self._answers: dict[Misreading, dict[str, Array]] = {}
-        self._known: dict[tuple[Misreading, str], list[Way]] = {}
-        sensors = plant.sensors
-        self.noise = {
-            'shaft_position': 2.0 * pi / sensors.encoder_counts,
-            'shaft_velocity': sensors.velocity_resolution,
-            'shaft_effort': max(sensors.effort_noise, sensors.effort_resolution),
-            'tension': max(sensors.load_cell_noise, sensors.load_cell_resolution),
-            'bending': sensors.tracker_noise,
-        }
+        self._right = self._readings['command'][0]
+        self._simulated = cache(self._simulate)
+        self._ways = cache(self._all_ways)
 
-    def judged(self, worth: float | None = None) -> tuple[Misreading, ...]:
+    def judged(self) -> tuple[Misreading, ...]:
         """Find the mistakes that make the recording more likely than their price, if any."""
-        worth = DERIVED.worth if worth is None else worth
-        right, usual = self._right(), DERIVED.usual
-        as_read = self._beyond_reach(right, worth)
-        as_read += sum(self._ways(right, q)[0].against(worth) for q in self.measured)
-        at_best = sum(self.measured[q].shape[1] * log(usual[q]) for q in self.measured)
-        if as_read - worth * at_best < log(KINDS):
-            return ()
-        least = as_read
+        least = self._beyond_reach(self._right)
+        least += sum(self._ways(self._right, q)[0].against for q in self._measured)
+        at_best = sum(v.shape[1] * log(USUAL[q]) for q, v in self._measured.items())
         best: tuple[Misreading, ...] = ()
-        for drive in self._misreadings('command', self._held.shape[1]):
+        if least - WORTH * at_best < log(KINDS):
+            return best
+        for drive in self._readings['command']:
             if drive.price and not self._may_be_meant(drive):
                 continue
-            against, said = self._beyond_reach(drive, worth), [drive] if drive.price else []
-            for quantity in self.measured:
+            against, meant = self._beyond_reach(drive), [drive]
+            for quantity in self._measured:
                 of_gear = drive.of_gear and quantity == 'shaft_position'
                 way = min(
                     (w for w in self._ways(drive, quantity) if not (of_gear and w.reading.of_gear)),
-                    key=lambda w: w.against(worth) + w.reading.price,
+                    key=lambda w: w.against + w.reading.price,
                 )
-                against += way.against(worth)
-                said += [way.reading] if way.reading.price else []
-            against += sum(_prices(said))
+                against += way.against
+                meant.append(way.reading)
+            mistakes = tuple(reading for reading in meant if reading.price)
+            # All that a motor's messages hold is exchanged together.
+            once = {
+                (m.quantity.partition('_')[0] if m.kind == 'order' else m.quantity, m.source): m
+                for m in mistakes
+            }
+            against += sum(m.price for m in once.values())
             if against < least - 1e-9:
-                least, best = against, tuple(said)
+                least, best = against, mistakes
         return best
 
     def shares(self, mistakes: Collection[Misreading] = ()) -> dict[str, Array]:
         """Misfit of each column of each quantity (columns,), read with these mistakes put right."""
         meant = {mistake.quantity: mistake for mistake in mistakes}
-        drive = meant.get('command', self._right())
+        drive = meant.get('command', self._right)
         return {
             q: next(
                 w.shares
                 for w in self._ways(drive, q)
                 if w.reading == meant.get(q, self._readings[q][0])
             )
-            for q in self.measured
+            for q in self._measured
         }
 
-    def unlike(self, mistakes: Collection[Misreading]) -> list[tuple[str, int]]:
-        """Quantities and columns that must move and are nothing like the simulated ones."""
+    def unlike(self, mistakes: Collection[Misreading]) -> list[Column]:
+        """Columns that must move and are nothing like the simulated ones."""
         # What they share is worth less than the scale that was fitted for it (Schwarz).
-        worth = DERIVED.worth
-        least = exp(-0.5 * log(worth) / worth)
-        drive = next((m for m in mistakes if m.quantity == 'command'), self._right())
+        least = exp(-0.5 * log(WORTH) / WORTH)
+        drive = next((m for m in mistakes if m.quantity == 'command'), self._right)
         return [
             (quantity, column)
             for quantity, shares in self.shares(mistakes).items()
             for column, share in enumerate(shares)
-            if share > least
-            and must_move(
-                self._answer(drive)[quantity][:, column], self.grid, 0.0, self.noise[quantity]
-            )
+            if share > least and self.must_move((quantity, column), 0.0, drive)
         ]
 
-    def _misreadings(self, quantity: str, columns: int) -> Iterator[Misreading]:
-        return misreadings(quantity, self._plant, self._rig.joints.gear, columns)
+    def must_move(self, column: Column, since: float, drive: Misreading | None = None) -> bool:
+        """Whether a column moves by more than its noise from `since` s on, as simulated."""
+        quantity, place = column
+        signal = self._simulated(drive or self._right)[quantity][self._grid >= since, place]
+        least = max(NOISES * self._noise[quantity], MOVES_RAD)
+        return len(signal) > 1 and bool(np.ptp(signal) > least)
 
-    def _right(self) -> Misreading:
-        return next(self._misreadings('command', self._held.shape[1]))
+    def is_noisy(self) -> bool:
+        """Whether the readings have noise, as those of a simulation have not."""
+        return any(
+            bool((self._scatter[q] > 0.1 * self._noise[q]).any())
+            for q in ('tension', 'bending')
+            if q in self._measured
+        )
 
     def _may_be_meant(self, drive: Misreading) -> bool:
         """Whether it moves, and either cannot be what was given or the shafts follow it."""
@@ -157,101 +176,64 @@ class Comparison:
         if np.abs(self._held).max() > self._rig.motors.reach:
             return True
         # Bending and tension of half the motion may be those of another rig.
-        if 'shaft_position' not in self.measured:
+        if 'shaft_position' not in self._measured:
             return not drive.of_gear
         followed = self._ways(drive, 'shaft_position')
-        allowed = log(DERIVED.follows) * self._held.shape[1]
+        allowed = log(FOLLOWS) * self._held.shape[1]
         return any(w.misfit <= allowed for w in followed if w.reading.kind in ('right', 'sign'))
 
-    def _beyond_reach(self, drive: Misreading, worth: float) -> float:
+    def _beyond_reach(self, drive: Misreading) -> float:
         """What speaks against a command that turns shafts further than the rig lets them.
 
         Of bending nothing is learnt: it follows any command at some scale.
         """
         turned = np.abs(self._held[:, list(drive.source)] / np.asarray(drive.factor)).max(axis=0)
         columns = int((turned > self._rig.motors.reach).sum())
-        return columns * worth * log(MOST / DERIVED.usual['shaft_position'])
-
-    def simulated(self, command: Misreading) -> dict[str, Array]:
-        """Simulate the plant on the command as it is meant."""
-        shaft = self._shaft(command)
-        answer = simulate(self._plant, shaft, start_shaft=shaft[0])
-        every = round(PERIOD_S / TICK)
-        return {
-            quantity: getattr(answer, quantity).reshape(len(shaft), -1)[::every]
-            for quantity in self.measured
-        }
-
-    def expected(self) -> dict[str, Array]:
-        """Simulate the plant on the command as it is read."""
-        return self.simulated(self._right())
-
-    def is_noisy(self) -> bool:
-        """Whether the readings have noise, as those of a simulation have not."""
-        return any(
-            bool((self._scatter[q] > 0.1 * self.noise[q]).any())
-            for q in ('tension', 'bending')
-            if q in self.measured
-        )
+        return columns * WORTH * log(MOST / USUAL['shaft_position'])
 
     def _shaft(self, command: Misreading) -> Array:
         shaft = self._held[:, list(command.source)] / np.asarray(command.factor)
         return np.clip(shaft, -LARGEST_COMMAND, LARGEST_COMMAND)
 
-    def _ways(self, command: Misreading, quantity: str) -> list[Way]:
+    def _simulate(self, command: Misreading) -> dict[str, Array]:
+        """What the plant makes of the command as it is meant, by quantity (N, columns)."""
+        shaft = self._shaft(command)
+        answer = simulate(self._plant, shaft, start_shaft=shaft[0])
+        every = round(PERIOD_S / TICK)
+        return {q: getattr(answer, q).reshape(len(shaft), -1)[::every] for q in self._measured}
+
+    def _all_ways(self, command: Misreading, quantity: str) -> list[Way]:
         """All ways to read a quantity where the command is meant so."""
-        if (command, quantity) not in self._known:
-            answer = self._answer(command)[quantity]
-            self._known[command, quantity] = self._ways_of(quantity, answer)
-        return self._known[command, quantity]
-
-    def _answer(self, command: Misreading) -> dict[str, Array]:
-        if command not in self._answers:
-            self._answers[command] = self.simulated(command)
-        return self._answers[command]
-
-    def _ways_of(self, quantity: str, simulated: Array) -> list[Way]:
-        moments = Moments.of(self.measured[quantity], simulated)
-        lowest, largest = DERIVED.scales[quantity]
-        usual = DERIVED.usual[quantity]
-        bounds = Bounds(
-            (lowest, largest),
-            TURN_RAD if quantity == 'bending' else inf,
-            self.noise[quantity],
-            self._scatter[quantity],
-            DERIVED.least_tension if quantity == 'tension' else -inf,
-        )
-        misfits: dict[float, Array] = {}
+        moments = Moments.of(self._measured[quantity], self._simulated(command)[quantity])
+        usual, largest = USUAL[quantity], SCALES[quantity][1]
+        rest = (quantity, self._noise[quantity], self._scatter[quantity])
+        misfit = cache(lambda factor: moments.misfit(factor, *rest))
         found = []
-        for reading in (*self._readings[quantity], *self._of_any_size(quantity, moments)):
-            misfit = []
-            for column, (source, factor) in enumerate(
-                zip(reading.source, reading.factor, strict=True)
-            ):
-                if factor not in misfits:
-                    misfits[factor] = moments.misfit(factor, bounds)
-                misfit.append(misfits[factor][:, source, column])
-            share, scale = np.transpose(misfit)
+        for reading in (*self._readings[quantity], *_of_any_size(quantity, moments)):
+            each = zip(reading.source, reading.factor, strict=True)
+            columns = [misfit(factor)[:, source, c] for c, (source, factor) in enumerate(each)]
+            share, scale = np.transpose(columns)
             kept = np.log(np.clip(share, usual, MOST))
             size = np.abs(np.log(np.maximum(scale, usual))) / max(log(largest), usual)
             found.append(Way(reading, share, float(kept.sum()), float(size.sum())))
         return found
 
-    def _of_any_size(self, quantity: str, moments: Moments) -> Iterator[Misreading]:
-        """Readings of a factor that belongs to no unit: of a gear, or of a converter."""
-        if quantity not in ('shaft_position', 'tension'):
-            return
-        size = moments.size()
-        columns = len(size)
-        whole = tuple(range(columns))
-        parts = [whole] if quantity == 'tension' else [*((c,) for c in whole), whole]
-        ways = CONVERTER_BITS * log(2.0) / DERIVED.usual[quantity]
-        for part in dict.fromkeys(parts):
-            factor = float(np.median(size[list(part)]))
-            of_a_rig = quantity == 'tension' and 1.0 / OTHER_RIGS <= factor <= OTHER_RIGS
-            if factor > 0.0 and not of_a_rig:
-                many = len(parts) - 1 if len(part) < columns else 1
-                yield scaled(quantity, 'factor', factor, part, columns, ways * many)
+
+def _of_any_size(quantity: str, moments: Moments) -> Iterator[Misreading]:
+    """Readings of a factor that belongs to no unit: of a gear, or of a converter."""
+    if quantity not in ('shaft_position', 'tension'):
+        return
+    size = moments.size()
+    columns = len(size)
+    whole = tuple(range(columns))
+    parts = [whole] if quantity == 'tension' else [*((c,) for c in whole), whole]
+    ways = CONVERTER_BITS * log(2.0) / USUAL[quantity]
+    for part in dict.fromkeys(parts):
+        factor = float(np.median(size[list(part)]))
+        of_a_rig = quantity == 'tension' and 1.0 / OTHER_RIGS <= factor <= OTHER_RIGS
+        if factor > 0.0 and not of_a_rig:
+            many = len(parts) - 1 if len(part) < columns else 1
+            yield scaled(quantity, 'factor', factor, part, columns, ways * many)
 
 
 def as_meant(recording: Recording, mistakes: Collection[Misreading]) -> Recording:
@@ -271,15 +253,6 @@ def as_meant(recording: Recording, mistakes: Collection[Misreading]) -> Recordin
     return recording.with_series(changed)
 
 
-def _prices(mistakes: list[Misreading]) -> list[float]:
-    """Price of each mistake; all that a motor's messages hold is exchanged together."""
-    prices = {
-        (m.quantity.partition('_')[0] if m.kind == 'order' else m.quantity, m.source): m.price
-        for m in mistakes
-    }
-    return list(prices.values())
-
-
 def _span(recording: Recording) -> tuple[float, float]:
     """From shortly before the first motion, no longer than is needed."""
     command = recording.command
@@ -297,7 +270,7 @@ def _scatter(series: Series) -> Array:
     if len(values) < 3:
         return np.zeros(values.shape[1])
     bow = values[1:-1] - 0.5 * (values[:-2] + values[2:])
-    return np.asarray(np.median(np.abs(bow), axis=0) / 0.6745 / np.sqrt(1.5))
+    return np.asarray(np.median(np.abs(bow), axis=0) / NORMAL_MEDIAN / np.sqrt(1.5))
 
 
 def _on_grid(series: Series, grid: Array, spiky: bool) -> Array:

@@ -16,15 +16,24 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.kernel import run_joints
 from endoscope_core.physics.layout import MOTOR_BANDWIDTH, OUTPUTS
 from endoscope_core.physics.packing import rest_state
-from endoscope_explain.audit.finding import Finding, Severity
+from endoscope_explain.audit.examined import Examined, without_times
+from endoscope_explain.audit.finding import FindingKind, Severity
 from endoscope_explain.observe.observation import ANALYSIS_PERIOD, JointObservation, observe
 from endoscope_explain.observe.predicted_signals import Flags, packed_rig
 from endoscope_explain.recording import LEAST_DURATION_S, MOVES_RAD, Array, Mask, Recording
 
+NOT_JUDGED = FindingKind(
+    'earlier_motion',
+    Severity.NOTE,
+    '{signals} had moved before the recording began, which shows until {end:.2f} s',
+    'what is before {end:.2f} s is not judged',
+)
+ESTIMATED = replace(
+    NOT_JUDGED, remedy='the state at the start is estimated, and all is judged from it'
+)
 MOST_REVERSALS = 5
 SHORTEST = 1e-6
 """Way back in rad, from where the motor stands, of the smallest reversals that are tried."""
@@ -37,34 +46,35 @@ FLIGHT = np.array([1e-3, 0.1])
 """Angle in rad and speed in rad/s by which that search begins to move a motor that is turning."""
 
 
-def with_state_at_start(
-    recording: Recording, plant: PlantDescription, findings: list[Finding]
-) -> Recording:
-    """Estimate from where the motors had come when a recording began, as its `start`."""
-    # The time until it no longer shows by more than the noise is left out, as long as enough is
-    # left. A rig that did not come straight from zero gets a note.
-    plant = plant.of_joints(recording.joints)
-    observations = observe(recording, plant)
-    parameters, flags = packed_rig(observations, plant)
+def find(seen: Examined) -> Examined:
+    """Estimate from where the motors had come when a recording began, as its `start`.
+
+    The time until it no longer shows by more than the noise is left out, as long as enough is left.
+    """
+    recording = seen.recording
+    observations = observe(recording, seen.plant)
+    parameters, flags = packed_rig(observations, seen.plant)
     begin = float(recording.command.time[0])
     reach = recording.rig.motors.reach
-    starts, speeds, left_out = [], [], []
+    starts, speeds, left_out, found = [], [], [], []
     for j, observation in enumerate(observations):
         way, speed, unjudged = observation.start, 0.0, 0.0
         if observation.channels:
             shaft = recording.shaft_position
-            seen = observation.start if shaft is None else shaft.values[:1, j]
-            past = _Past(observation, parameters[j], flags[j], float(seen[0]), reach)
+            at = observation.start if shaft is None else shaft.values[:1, j]
+            past = _Past(observation, parameters[j], flags[j], float(at[0]), reach)
             start, came_straight = past.estimated()
             way, speed = past.came(start)
-            unjudged = begin + start.turns_until
+            end = unjudged = begin + start.turns_until
             if not came_straight:
                 end = begin + past.shows_until
                 if _is_enough(recording, j, end) or past.alone_is_unexplained(start):
                     unjudged = end
-                findings.append(_finding(observation.joint, begin, end, unjudged, way))
-            elif start.turns_until:
-                findings.append(_finding(observation.joint, begin, unjudged, unjudged, way))
+            if not came_straight or start.turns_until:
+                kind, joint = ESTIMATED if unjudged < end else NOT_JUDGED, observation.joint
+                backs = {f'reversal_{k}_rad': float(a) for k, a in enumerate(way[:-1], start=1)}
+                note = kind.found(recording, (joint,), [(begin, end)], joint=joint, evidence=backs)
+                found.append(note)
         starts.append(way)
         speeds.append(speed)
         left_out.append(unjudged)
@@ -72,13 +82,9 @@ def with_state_at_start(
     # To stay where it has come to adds nothing to a way.
     ways = [np.pad(way, (0, longest - len(way)), mode='edge') for way in starts]
     recording = replace(recording, start=np.stack(ways), start_speed=np.array(speeds))
-    changed = {}
-    for name, series in recording.measured().items():
-        early = series.time[:, None] < np.array(left_out)[None]
-        shape = (*early.shape, *(1,) * (series.values.ndim - 2))
-        early = np.broadcast_to(early.reshape(shape), series.valid.shape)
-        changed[name] = series.without(early)
-    return recording.with_series(changed)
+    return seen.found(
+        *found, recording=without_times(recording, lambda t: t[:, None] < np.array(left_out))
+    )
 
 
 class _Past:
@@ -116,16 +122,13 @@ class _Past:
             """What leaves no more than noise of a motor is judged from the beginning."""
             return replace(start, turns_until=turns_until if left(start) > 1.0 else 0.0)
 
-        def flying(numbers: Array) -> float:
-            return left(_Start(numbers))
-
         # A motor that rested where it was sent or where it was read, or one that was turning.
         rests = [_Start(np.array([angle, 0.0])) for angle in (asked, seen)]
         self._begins = [judged(min(rests, key=left))]
         if turns_until:
             turning = np.array([first_seen, first_speed])
             options = _around(turning, FLIGHT)
-            found = minimize(flying, turning, method=SEARCH, options=options)
+            found = minimize(lambda n: left(_Start(n)), turning, method=SEARCH, options=options)
             self._begins.append(judged(_Start(found.x)))
         # Whatever the rig did before, its state lies between those of its greatest excursions.
         self.shows_until = differ_until([-reach, min(ends)], [reach, max(ends)])
@@ -272,21 +275,3 @@ def _is_enough(recording: Recording, joint: int, since: float) -> bool:
     later = command.values[command.time >= since, joint]
     long = recording.duration - since >= LEAST_DURATION_S
     return bool(long and len(later) and np.ptp(later) >= MOVES_RAD)
-
-
-def _finding(joint: str, begin: float, end: float, unjudged: float, way: Array) -> Finding:
-    if unjudged < end:
-        remedy = 'the state at the start is estimated, and all is judged from it'
-    else:
-        remedy = f'what is before {end:.2f} s is not judged'
-    return Finding(
-        'earlier_motion',
-        Severity.NOTE,
-        joint,
-        'recording',
-        (joint,),
-        ((begin, end),),
-        f'{joint} had moved before the recording began, which shows until {end:.2f} s',
-        remedy,
-        evidence={f'reversal_{k}_rad': float(angle) for k, angle in enumerate(way[:-1], start=1)},
-    )
