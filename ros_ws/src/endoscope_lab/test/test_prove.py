@@ -103,11 +103,13 @@ def test_a_seal_is_the_digest_of_its_file_and_breaks_with_it(tmp_path):
         opened(path, told)
 
 
-def outcome(laws, said, after=1.0):
+def outcome(laws, reported, after=1.0):
     line = np.zeros(2)
-    answer = Answer(1, 'So.', tuple(said), 9.0, 5.0, after, Passage('s', 'N', line, line, {}), 1.0)
+    answer = Answer(
+        1, 'So.', tuple(reported), 9.0, 5.0, after, Passage('s', 'N', line, line, {}), 1.0
+    )
     rig = Rig(1, None, '', tuple(laws), frozenset(), 0.2)
-    return Outcome(rig, answer, {}, judged(laws, answer.said))
+    return Outcome(rig, answer, {}, judged(laws, answer.reported))
 
 
 def test_a_proof_from_end_to_end(tmp_path, capsys):

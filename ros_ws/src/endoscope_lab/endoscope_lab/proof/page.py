@@ -40,7 +40,7 @@ def _rig(outcome: Outcome) -> dict:
         'sealed': f'{folder_of(number)}/{TRUTH}',
         'report': report_of(number),
         'concealed': sentences.concealed(outcome),
-        'said': sentences.said(answer.said),
+        'reported': sentences.reported(answer.reported),
         'sentence': answer.sentence,
         'result': sentences.result(outcome),
         'right': outcome.judgement.exact,

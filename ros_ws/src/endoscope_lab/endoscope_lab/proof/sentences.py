@@ -41,9 +41,9 @@ def concealed(outcome: Outcome) -> str:
     return (' and '.join(laws) or 'nothing') + (f' ({words})' if words else '')
 
 
-def said(statements: Sequence[Statement]) -> str:
-    """What was named, the most certain first."""
-    names = [f'{s.name} on {s.joint}' + _rivals(s) for s in statements]
+def reported(statements: Sequence[Statement]) -> str:
+    """The reported names, the most certain first."""
+    names = [f'{s.name} on {s.joint}' + _alternatives(s) for s in statements]
     return ', '.join(names) or 'nothing'
 
 
@@ -57,12 +57,12 @@ def result(outcome: Outcome) -> str:
     if how.first:
         return 'right, and more is named beside it'
     if how.in_set:
-        return 'among the names that it cannot tell apart'
+        return 'among the alternatives that these motions do not distinguish'
     if how.place:
         return 'the right place by another name'
     if how.stage:
         return 'the right part of the chain, another law'
-    return 'missed' if not outcome.answer.said else 'wrong'
+    return 'missed' if not outcome.answer.reported else 'wrong'
 
 
 def tracking(outcome: Outcome) -> str:
@@ -77,11 +77,11 @@ def tracking(outcome: Outcome) -> str:
 
 
 def why(outcome: Outcome) -> str:
-    """Why it is not right, as far as the second recording tells; empty where it is."""
+    """Why the answer is not right, by the second recording; empty if it is right."""
     if outcome.judgement.exact:
         return ''
     answer = outcome.answer
-    if not answer.said:
+    if not answer.reported:
         return (
             f'The law moves {100.0 * outcome.rig.moved:.0f} % of the signal that shows it most. '
             f'Other numbers hide it: they predict the second recording to '
@@ -90,13 +90,13 @@ def why(outcome: Outcome) -> str:
     if answer.after <= GOOD:
         return (
             'What is named instead predicts the second recording to '
-            f'{digits(answer.after)} times its noise: these motions do not tell it from the truth.'
+            f'{digits(answer.after)} times its noise: these motions do not distinguish it.'
         )
     return f'What is named leaves {digits(answer.after)} times the noise: the law is not found.'
 
 
-def _rivals(statement: Statement) -> str:
-    return f' (or {", ".join(statement.rivals)})' if statement.rivals else ''
+def _alternatives(statement: Statement) -> str:
+    return f' (or {", ".join(statement.alternatives)})' if statement.alternatives else ''
 
 
 def _lower(text: str) -> str:

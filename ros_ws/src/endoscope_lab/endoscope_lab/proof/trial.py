@@ -136,11 +136,11 @@ class Passage:
 
 @dataclass(frozen=True)
 class Answer:
-    """What was said of a rig before its seal was opened."""
+    """The explanation of a rig before its seal was opened."""
 
     number: int
     sentence: str
-    said: tuple
+    reported: tuple
     # Misfit of the second recording over its noise, of the worst signal, with the plant as
     # described, refitted and improved.
     before: float
@@ -214,9 +214,9 @@ def explained(number: int, folder: Path, command: str) -> Answer:
 
 
 def compared(rig: Rig, answer: Answer) -> Outcome:
-    """Open a rig's seal and judge what was said of it; BrokenSealError if it was changed since."""
+    """Open a rig's seal and judge its explanation; BrokenSealError if the file was changed."""
     truth = opened(rig.folder / TRUTH, rig.sha256)
-    return Outcome(rig, answer, truth, judged(rig.laws, answer.said, rig.also))
+    return Outcome(rig, answer, truth, judged(rig.laws, answer.reported, rig.also))
 
 
 def followed(folder: Path, truth: dict, seed: int) -> dict[str, Tracked]:
