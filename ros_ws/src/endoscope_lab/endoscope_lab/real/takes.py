@@ -141,7 +141,7 @@ def _on_a_clock(table: Array, seconds: float) -> tuple[Array, Array]:
 
 
 def _noise(values: Array) -> float:
-    """Rms of white noise by third differences, which take out what is smooth, slips apart."""
+    """Rms of white noise by third differences, which remove smooth signals; robust to slips."""
     # A third difference has 20 times the variance (von Neumann et al., Ann. Math. Stat. 12, 1941).
     return float(1.4826 * np.median(np.abs(np.diff(values, 3, axis=0))) / np.sqrt(20.0))
 

@@ -203,7 +203,7 @@ def _trained(
             for name, part in parts.items():
                 part.load_state_dict(state[name])
             begin, curve = state['step'], state['curve']
-            report(f'goes on after step {begin} of {settings.steps}')
+            report(f'resumes after step {begin} of {settings.steps}')
     network.train()
     losses = []
     for step in range(begin, settings.steps):
