@@ -32,7 +32,7 @@ def rig(tmp_path_factory):
             for row in (
                 ('compensator killed', 'FAULT'),
                 ('master stalled for 2 s', 'FAULT'),
-                ('rival on slave/servo_jp', 'FAULT'),
+                ('competing publisher on slave/servo_jp', 'FAULT'),
                 ('clutch released and pressed within 0.6 s', None),
                 ('commands 0.12 to 0.5 s late, outside program', 'FAULT'),
             )

@@ -13,7 +13,7 @@ INTERVAL_WIDTH = 1.56
 POSTERIOR = (-4.17, 0.677, 0.559, 1.3, 4.71, -1.97, -0.563, -4, 1.62)
 """Weights of the logarithm of the temperature of evidence: of one, and of the logarithms of the
 largest gain, of what form is worth, and of what is left over what another form leaves. Then of the
-odds of nothing: of one, of whether something is said to be missing, and of the logarithm of the
+odds of nothing: of one, of whether something is found to be missing, and of the logarithm of the
 largest gain. Then of those of something else: of one, and of what is left."""
 MASS = 0.793
 """Probability of the likeliest names up to which a set takes one more."""

@@ -1,1 +1,1 @@
-"""Measures the figures of the documentation: `endoscope bench`. No other package imports it."""
+"""Offline work: benchmarks, training, data sets, fits and proof. No other package imports it."""

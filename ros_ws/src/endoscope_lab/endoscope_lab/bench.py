@@ -1,4 +1,4 @@
-"""What every bench does: work side by side, progress, rows of tables, and the machine."""
+"""Common parts of the benchmarks: parallel work, progress, rows of tables, and the machine."""
 
 import json
 import os
@@ -16,7 +16,7 @@ from endoscope_core.workers import worker_pool
 
 
 def chosen[T](kind: str, names: Sequence[str] | None, known: Mapping[str, T]) -> dict[str, T]:
-    """What was chosen of what is known, all by default; EndoscopeError for an unknown name."""
+    """Known items by chosen names, all by default; EndoscopeError for an unknown name."""
     require_known(kind, names or (), known)
     return {name: known[name] for name in names or known}
 
@@ -31,7 +31,7 @@ def require_known(kind: str, names: Collection[str], known: Collection[str]) -> 
 def side_by_side[C: tuple[Any, ...]](
     jobs: int, function: Callable[..., Any], calls: Sequence[C]
 ) -> Iterator[tuple[C, Future[Any]]]:
-    """Yield each call with its future, as they are done."""
+    """Yield each call with its future, in the order of completion."""
     with worker_pool(jobs) as pool:
         futures = {pool.submit(function, *call): call for call in calls}
         for future in as_completed(futures):
@@ -39,12 +39,12 @@ def side_by_side[C: tuple[Any, ...]](
 
 
 def report(line: str) -> None:
-    """Say on stderr how far it has come."""
+    """Print a line of progress to stderr."""
     print(line, file=sys.stderr, flush=True)
 
 
 def kept_rows[R](file: Path, kind: type[R]) -> list[R]:
-    """Read what `keep_row` wrote; EndoscopeError for a line that is none of the dataclass."""
+    """Read rows that `keep_row` wrote; EndoscopeError for a line without the dataclass's fields."""
     rows = []
     for number, line in enumerate(file.read_text(encoding='utf-8').splitlines(), 1):
         try:
@@ -57,12 +57,12 @@ def kept_rows[R](file: Path, kind: type[R]) -> list[R]:
 
 
 def rows_so_far[R](file: Path | None, kind: type[R]) -> list[R]:
-    """Read the rows that a bench kept before it was ended; none without a file."""
+    """Read the rows that an interrupted bench has stored; none without a file."""
     return kept_rows(file, kind) if file is not None and file.exists() else []
 
 
 def keep_row(file: Path | None, row: Any) -> None:
-    """Add a row, which is a dataclass, at the end of a file of JSON lines, if there is one."""
+    """Append a row, a dataclass, to a file of JSON lines, unless the file is None."""
     if file is None:
         return
     with file.open('a', encoding='utf-8') as lines:
@@ -79,13 +79,13 @@ def table_head(*columns: str) -> str:
 
 
 def spread(values: Sequence[float]) -> tuple[float, float, float]:
-    """Median, what 99 % do not exceed, and the largest."""
+    """Median, 99th percentile and maximum."""
     ordered = sorted(values)
     return ordered[len(ordered) // 2], ordered[len(ordered) * 99 // 100], ordered[-1]
 
 
 def today_and_machine() -> str:
-    """Date, cores and processor, which a table is headed by."""
+    """Date, cores and processor, for the heading of a table."""
     processor = platform.processor() or platform.machine()
     return f'{time.strftime("%Y-%m-%d")}, {os.cpu_count()} cores, {processor}'
 

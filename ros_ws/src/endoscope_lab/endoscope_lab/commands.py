@@ -1,4 +1,4 @@
-"""`endoscope bench NAME`: measures a figure of the documentation on this machine."""
+"""`endoscope bench NAME`: measure a figure of the documentation on this machine."""
 
 import argparse
 import importlib
@@ -10,21 +10,21 @@ from typing import Any
 from endoscope_bringup.subcommands import COUNT, seed, within
 
 Option = tuple[str, dict[str, Any]]
-"""Its name, and what argparse has to know of it."""
+"""Name of an option, and its arguments for argparse."""
 
 
 @dataclass(frozen=True)
 class Bench:
-    """A bench: `run(args)` of its module measures, prints, and returns the exit status."""
+    """A benchmark: `run(args)` of its module measures, prints, and returns the exit status."""
 
-    module: str  # in this package; imported once the bench is chosen
+    module: str  # in this package; imported when the benchmark is chosen
     help: str
     description: str
     options: tuple[Option, ...]
 
 
 def seeds(text: str) -> range:
-    """Read a range of seeds, `A-B` with both ends, or one; ArgumentTypeError if it is none."""
+    """Read a range of seeds, `A-B` inclusive, or one seed; ArgumentTypeError otherwise."""
     found = re.fullmatch(r'(\d+)(?:-(\d+))?', text)
     if not found or int(found[2] or found[1]) < int(found[1]):
         raise argparse.ArgumentTypeError(f'{text!r} are not seeds: give 1-20, or 7')
@@ -48,7 +48,7 @@ def _count(name: str, what: str, default: int) -> Option:
 
 
 def _jobs(default: int = 1) -> Option:
-    return _count('--jobs', 'side by side', default)
+    return _count('--jobs', 'parallel jobs', default)
 
 
 def _seconds(default: float, what: str, name: str = '--seconds') -> Option:
@@ -76,166 +76,179 @@ def _flag(name: str, what: str) -> Option:
 BENCHES: dict[str, Bench] = {
     'graph': Bench(
         'graph',
-        'ticks, latency and CPU time of the node graph',
-        'Runs all nodes on the simulated slave: in one process in real time, with a recorder; in '
-        'lock-step as fast as it goes; and each in a process of its own at falling rates until one '
-        'is carried. With --recorder, sends 5, 10 and 20 thousand messages/s to a recorder in a '
-        'process of its own instead, and looks into the bag. Exits 1 where a target is missed.',
+        'tick rate, latency and CPU time of the node graph',
+        'Runs all nodes on the simulated slave: in one process in real time with a recorder; in '
+        'lock-step at full speed; and in one process for each node, at decreasing rates until a '
+        'rate is sustained. With --recorder, sends 5, 10 and 20 thousand messages/s to a separate '
+        'recorder process instead, and reads the bag. Exits 1 if a target is missed.',
         (
-            _seconds(60.0, 'length of the run in one process, and of one of --recorder'),
+            _seconds(60.0, 'length of the run in one process, and of each run of --recorder'),
             _seconds(10.0, 'length of each run in many processes, 0 for none', '--process-seconds'),
-            _flag('--recorder', 'what the recorder takes without loss, and its CPU time'),
-            _seconds(0.0, 'instead, let participants come and go for so long at 1 kHz', '--soak'),
+            _flag('--recorder', 'measure the rate recorded without loss, and its CPU time'),
+            _seconds(
+                0.0, 'instead, let participants join and leave for this long at 1 kHz', '--soak'
+            ),
         ),
     ),
     'console': Bench(
         'console.console',
-        'how soon the slave stops whatever happens to the page',
-        'Starts `endoscope console` with its graph and a real Chromium in which a key is held, '
-        'lets one thing after the other happen to the page, and prints a table; then the latency '
-        'of an input. Exits 1 where something moved without a new grip.',
+        'time until the slave stops after an event on the page',
+        'Starts `endoscope console` with its graph and a real Chromium in which a key is held. '
+        'Triggers events on the page, such as a closed tab, and prints the stopping times; then '
+        'prints the latency of an input. Exits 1 if anything moves before the key is pressed '
+        'again.',
         (
-            _count('--repetitions', 'of each event', 30),
-            _option('--only', 'events to try; `all` for all', nargs='+', metavar='EVENT'),
-            _count('--inputs', 'inputs whose latency is taken', 30),
-            _flag('--real-time', 'run the graph by the wall clock, with its deadlines'),
+            _count('--repetitions', 'repetitions of each event', 30),
+            _option('--only', 'events to trigger; `all` for all', nargs='+', metavar='EVENT'),
+            _count('--inputs', 'inputs whose latency is measured', 30),
+            _flag('--real-time', 'run the graph on the wall clock, with its deadlines'),
         ),
     ),
     'faults': Bench(
         'faults.faults',
-        'what the slave does when a node, a motor or the master fails, or a second sender appears',
-        'Runs the graph on the simulated slave, each node a process, breaks one thing after the '
-        'other at random instants of the motion, enables anew, and prints a table. Exits 1 where '
-        'the slave moved without an enable, a step was beyond the bound of the shaper, or an '
-        'enable did not work. With --motors, breaks servos, their line and the master on emulated '
-        'servos instead; exits 1 where the slave does not end as it must.',
+        'fault injection: failing nodes and motors, competing publishers',
+        'Runs the graph on the simulated slave with one process for each node, injects one fault '
+        'after the other at random instants of the motion, enables the slave again, and prints a '
+        'table. Exits 1 if the slave moves without an enable, a step exceeds the bound of the '
+        'shaper, or an enable fails. With --motors, injects faults of servos, their bus and the '
+        'master on emulated servos instead; exits 1 if the slave does not reach the required '
+        'state.',
         (
-            _count('--repetitions', 'of each fault', 100),
-            _count('--rate', 'ticks/s', 500),
-            _flag('--composed', 'all nodes in one process'),
-            _flag('--motors', 'faults of the motors, once each'),
-            _seed('of all chance'),
+            _count('--repetitions', 'repetitions of each fault', 100),
+            _count('--rate', 'ticks per second', 500),
+            _flag('--composed', 'run all nodes in one process'),
+            _flag('--motors', 'inject faults of the motors, once each'),
+            _seed('seed of all random draws'),
             _only('fault'),
         ),
     ),
     'concealed': Bench(
         'concealed.trial',
-        'explain rigs that are drawn with something concealed in them',
-        'Draws rigs with something concealed, explains a recording of each, and prints a line for '
-        'each case and a table. Every seed is a case of every stratum. Seeds from 1 to 99 are for '
-        'development; of others, first runs are reported. With --json each case is kept once it is '
-        'known, and what the file has is not explained again: a long run goes on where it was '
-        'stopped. With --derive, derives the numbers of endoscope_explain/criteria.py from the '
-        'cases, and prints what half and double of each would do. Exits 1 if a case could not be '
-        'explained, or differs from --against.',
+        'blind benchmark: explain rigs with injected effects',
+        'Blind benchmark: injected effects. Draws rigs with injected effects, explains a recording '
+        'of each, and prints a line for each case and a table. Every seed is one case of every '
+        'stratum. Seeds 1 to 99 are for development; of other seeds, first runs are published. '
+        'With --json, rows are stored as cases finish, and cases in the file are not explained '
+        'again, so that a long run can be resumed. With --derive, derives the numbers of '
+        'endoscope_explain/criteria.py from the cases, and prints the effect of halving and '
+        'doubling each. Exits 1 if a case cannot be explained, or differs from --against.',
         (
             _option('--stratum', 'kinds of cases (default: all)', nargs='+', metavar='NAME'),
-            _seeds('of the cases (default: 1-3)'),
+            _seeds('seeds of the cases (default: 1-3)'),
             _jobs(),
             _file('--json', 'file for all rows'),
             _file(
-                '--against', 'rows of an earlier run: explain the same cases, and say what differs'
+                '--against', 'rows of an earlier run: explain the same cases and print differences'
             ),
             _flag('--derive', 'derive the numbers by which explanations are judged'),
-            _file('--write', 'module for them'),
+            _file('--write', 'Python module to write the derived numbers to'),
         ),
     ),
     'investigate': Bench(
         'investigate',
-        'ask concealed rigs for motions until they are explained',
-        'Draws rigs with something concealed, of the kernel and of a simulator that shares nothing '
-        'with it, every fourth with two effects. Each is explained by the commissioning motion, by '
-        'the loop of `endoscope investigate`, and by one fixed motion as long as all of the loop '
-        'together. Prints a line for each rig and way, and a table. Seeds from 1 to 99 are for '
-        'development; of others, first runs are reported. With --json each rig is kept once it is '
-        'known, and what the file has is not done again. Exits 1 if a rig could not be explained.',
+        'blind benchmark of `endoscope investigate` on rigs with injected effects',
+        'Draws rigs with injected effects, of the kernel and of a simulator that shares no code '
+        'with it, every fourth with two effects. Explains each by the commissioning motion, by the '
+        'loop of `endoscope investigate`, and by one fixed motion as long as all motions of the '
+        'loop. Prints a line for each rig and method, and a table. Seeds 1 to 99 are for '
+        'development; of other seeds, first runs are published. With --json, rows are stored as '
+        'rigs finish, and rigs in the file are skipped. Exits 1 if a rig cannot be explained.',
         (
-            _seeds('of the rigs (default: 1-4)', last=4),
+            _seeds('seeds of the rigs (default: 1-4)', last=4),
             _jobs(),
             _file('--json', 'file for all rows'),
-            _minutes('--minutes', 'after which no rig is begun, and no motion played', 1440.0),
-            _minutes('--rig-minutes', 'after which no further motion of a rig is played', 60.0),
+            _minutes('--minutes', 'time after which no rig or motion is started', 1440.0),
+            _minutes('--rig-minutes', 'time after which a rig plays no further motion', 60.0),
         ),
     ),
     'mistakes': Bench(
         'mistakes.mistake',
-        'audit recordings in which something was taken wrongly',
-        'Draws a recording of each kind of mistake for every seed and prints which were not '
-        'reported correctly; then correct recordings, and prints what was reported of them. Seeds '
-        'from 1 to 99 are for development; of others, first runs are reported.',
+        'audit recordings with injected mistakes of units, signs and signals',
+        'Draws a recording with each kind of mistake for every seed, and correct recordings. '
+        'Prints mistakes that the audit does not report correctly, false alarms on correct '
+        'recordings, and a table. Seeds 1 to 99 are for development; of other seeds, first runs '
+        'are published.',
         (
-            _seeds('of mistakes (1)', last=1),
-            _seeds('of correct recordings (1-10)', '--sound', last=10),
+            _seeds('seeds of recordings with mistakes (1)', last=1),
+            _seeds('seeds of correct recordings (1-10)', '--sound', last=10),
             _jobs(),
         ),
     ),
     'watch': Bench(
         'watch.trial',
-        'whether a rig that becomes different while it moves is noticed',
-        'Changes a moving rig in each of ten ways for every seed, and prints how many changes were '
-        'told within 10 s of motion, and at the right stage; then moves rigs that stay as they '
-        'are, 10 min each, and prints the false alarms. Seeds from 1 to 999 are for development; '
-        'of others, first runs are reported. With --cost, runs all nodes with and without the '
-        'watch instead, and exits 1 where watching costs more than 10 % of a core.',
+        'change detection: rigs that change while they move',
+        'Change detection. Changes a moving rig in each of ten ways for every seed, and prints how '
+        'many changes are reported within 10 s of motion, and at the right stage; then moves rigs '
+        'that do not change, 10 min each, and prints the false alarms. Seeds 1 to 999 are for '
+        'development; of other seeds, first runs are published. With --cost, runs all nodes with '
+        'and without the watch instead, and exits 1 if it costs more than 10 % of a core.',
         (
-            _seeds('of the changes (1-3)'),
-            _seeds('of rigs that stay as they are (1-6)', '--nominal', last=6),
+            _seeds('seeds of rigs that change (1-3)'),
+            _seeds('seeds of rigs that do not change (1-6)', '--nominal', last=6),
             _only('change'),
-            _flag('--derive', 'derive the thresholds from these'),
-            _file('--write', 'module for them'),
-            _file('--json', 'file for all rows; what is in it is not done again'),
-            _seconds(86400.0, 'take what there is after so long, in s', '--within'),
+            _flag('--derive', 'derive the thresholds from rigs that do not change'),
+            _file('--write', 'Python module to write the derived thresholds to'),
+            _file('--json', 'file for all rows; cases in it are skipped'),
+            _seconds(86400.0, 'stop after this time in s and print what is finished', '--within'),
             _jobs(),
-            _flag('--cost', 'CPU time and pace of the graph'),
+            _flag('--cost', 'measure CPU time and rate of the graph'),
         ),
     ),
     'validity': Bench(
         'validity',
-        'how long a calibration stays good',
-        'Calibrates rigs in tubes that nothing was fitted on, lets wires, sheaths, tube and load '
-        'become what they become in four hours of work, and prints from time to time what another '
-        'calibration says, how the tip tracks by the first calibration and by the new one, and '
-        'whether a watch tells that the rig has changed. Seeds from 1 to 100 are for development.',
+        'how long a calibration stays valid',
+        'Calibrates rigs in tubes that no fit has used, and changes wires, sheaths, tube and load '
+        'as four hours of work do. At several times, prints the result of a new calibration, the '
+        'tracking error of the tip with the first and the new calibration, and whether a watch '
+        'reports the change. Seeds 1 to 100 are for development.',
         (
-            _seeds('of the tubes (1-3)'),
+            _seeds('seeds of the tubes (1-3)'),
             _only('cause'),
-            _file('--json', 'file for all rows; what is in it is not done again'),
-            _file('--picture', 'SVG file for a picture of it'),
+            _file('--json', 'file for all rows; cases in it are skipped'),
+            _file('--picture', 'SVG file for a plot of the errors'),
             _jobs(),
         ),
     ),
     'real': Bench(
         'real.tables',
-        'explain real recordings of a flexible endoscope by one physics',
-        'Fits five tubes together on 1.3 cycles and searches what they lack, predicts the rest, '
-        'and carries what was found to the rig in other states. The recordings are '
-        'no part of this project: optimization/selected and operation/optimizer_input of '
-        'nhoyh/hysteresis_compensation_ROS, in one folder.',
+        'explain real recordings of a flexible endoscope by one plant',
+        'Fits five tubes together on 1.3 cycles, searches for missing physics, predicts the rest, '
+        'and applies the result to the rig in other states. The recordings are not part of this '
+        'project: put optimization/selected and operation/optimizer_input of '
+        'nhoyh/hysteresis_compensation_ROS into one folder.',
         (
             _option('folder', 'folder of the recordings', type=Path),
             _file('--out', 'page to write (real.html)', Path('real.html')),
             _flag(
                 '--thorough',
-                'each tube alone as well, all with the name withheld, and each piece taken out',
+                'also explain each tube alone, withhold the name found, and remove each component',
             ),
             _jobs(),
         ),
     ),
     'papers': Bench(
         'papers.papers',
-        "the papers' tables beside ours",
-        'Measures what the two papers report, on tube configurations that nothing was fitted on, '
-        'and prints it beside their figures: tension_by_shape, classifiers, nearest_class, '
-        'colon_shapes, compensators, reach, changing_tube, calibration_time, real_sizes, '
-        'real_recordings. Where they are asked for by --only, two tables more say how a '
-        'calibration fares with load cells that drift, clip, stick or are unplugged (load_cells), '
-        'and with cells that are read slowly (reading_rates). Exits 1 if an aim is missed.',
+        'the tables of the two papers, with our figures',
+        'Measures the figures of the two papers on tube configurations that no fit has used, and '
+        'prints both: tension_by_shape, classifiers, nearest_class, colon_shapes, compensators, '
+        'reach, changing_tube, calibration_time, real_sizes, real_recordings. Two more tables are '
+        'printed on request (--only): calibrations with load cells that drift, clip, stick or are '
+        'unplugged (load_cells), and with cells that are read slowly (reading_rates). Exits 1 if '
+        'an aim is missed.',
         (
-            _seed('chooses tubes, rigs and noise'),
-            _count('--tubes', 'tube configurations of each row; of load cells, of each class', 5),
+            _seed('seed of tubes, rigs and noise'),
+            _count('--tubes', 'tube configurations per row; for load_cells, per class', 5),
             _only('table'),
-            _option('--motion', 'of load cells: sinusoid or brief (sinusoid)', default='sinusoid'),
-            _file('--weights', 'of load cells: from `endoscope train` (those of the product)'),
+            _option(
+                '--motion',
+                'motion of load_cells and reading_rates: sinusoid or brief (sinusoid)',
+                default='sinusoid',
+            ),
+            _file(
+                '--weights',
+                'classifier weights for load_cells and reading_rates, from `endoscope train` '
+                '(those shipped)',
+            ),
         ),
     ),
 }

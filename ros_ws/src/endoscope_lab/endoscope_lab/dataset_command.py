@@ -12,30 +12,31 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser = subparsers.add_parser(
         'dataset',
         help='simulate calibration recordings of known backlash size',
-        description='Writes recordings.npz and manifest.json to DIR: calibrations of random rigs, '
-        'or of one, in random tubes, seven classes of backlash size from 40 to 100 deg.',
+        description='Writes recordings.npz and manifest.json to DIR: simulated calibrations of '
+        'one or many random instruments in random tubes, in seven classes of backlash size from '
+        '40 to 100 deg.',
     )
     parser.add_argument(
         '--out', type=Path, required=True, metavar='DIR', help='new or empty folder'
     )
-    parser.add_argument('--seed', type=seed, default=7, help='the same seed, the same data set (7)')
+    parser.add_argument('--seed', type=seed, default=7, help='seed of the data set (7)')
     parser.add_argument(
         '--n',
         type=int,
         default=210,
         metavar='N',
-        help='recordings, as many of each of the seven classes (210)',
+        help='number of recordings, the same for each of the seven classes (210)',
     )
     parser.add_argument(
         '--instruments',
         choices=('one', 'many'),
         default='many',
-        help='one: the same as mounted in every tube; many: another in each (many)',
+        help='one: the same instrument in every tube; many: a new one in each (many)',
     )
     parser.add_argument(
         '--reset-pretension',
         action='store_true',
-        help='set the pretension of the one instrument by hand before each recording',
+        help='set the pretension of the one instrument again before each recording',
     )
     parser.add_argument(
         '--motion',

@@ -1,4 +1,4 @@
-"""`endoscope fit`: parameter sets from a data set, and the rig from recordings of its tubes."""
+"""`endoscope fit`: parameter sets from a data set, and a rig from recordings of its tubes."""
 
 import argparse
 import sys
@@ -17,26 +17,32 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     classes = kinds.add_parser(
         'classes',
         help='a parameter set for each class of a data set',
-        description='Fits a hysteresis model to each class of a data set of `endoscope dataset`, '
-        'and the feed-forward that goes with it; writes JSON.',
+        description='Fits a hysteresis model and its feed-forward to each class of a data set of '
+        '`endoscope dataset`; writes JSON.',
     )
-    classes.add_argument('source', type=Path, metavar='DATASET', help='of `endoscope dataset`')
-    classes.add_argument('--model', choices=MODELS, required=True, help='the model')
     classes.add_argument(
-        '--per-class', type=COUNT, default=30, metavar='N', help='most recordings of each (30)'
+        'source', type=Path, metavar='DATASET', help='data set of `endoscope dataset`'
+    )
+    classes.add_argument('--model', choices=MODELS, required=True, help='hysteresis model')
+    classes.add_argument(
+        '--per-class',
+        type=COUNT,
+        default=30,
+        metavar='N',
+        help='recordings per class, at most (30)',
     )
     classes.add_argument('--out', type=Path, required=True, metavar='FILE', help='JSON to write')
     family = kinds.add_parser(
         'family',
-        help='a rig, from recordings of all its tubes',
-        description='Identifies the rig from recordings of all its tubes (text files 0.txt, '
-        '60.txt, ... named by the bend in deg), fitted to the first cycle of each and judged on '
-        'the second, beside friction lumped at the ends.',
+        help='a rig, from recordings in all its tubes',
+        description='Identifies a rig from recordings in all its tubes (text files 0.txt, 60.txt, '
+        '... named by the bend in deg). Fits 1.3 cycles of each, validates on the rest, and '
+        'compares with friction lumped at the ends.',
     )
     family.add_argument('source', type=Path, metavar='FOLDER', help='recordings of tubes')
-    family.add_argument('--out', type=Path, metavar='FILE', help='YAML for the numbers')
+    family.add_argument('--out', type=Path, metavar='FILE', help='YAML file for the parameters')
     for each in (classes, family):
-        each.add_argument('--seed', type=seed, default=0, help='of the search (0)')
+        each.add_argument('--seed', type=seed, default=0, help='seed of the search (0)')
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""`endoscope bench graph`: whether the node graph keeps its pace, in one process and in many."""
+"""`endoscope bench graph`: whether the node graph keeps its rate, in one process and in many."""
 
 import argparse
 import faulthandler
@@ -71,7 +71,7 @@ _PLAYING = {'source': 'motion', 'motion': 'periodic'}
 
 
 def composed_graph_is_carried(seconds: float) -> bool:
-    """Measure all nodes, recorder included, composed here in real time, once they have settled."""
+    """Measure all nodes, recorder included, in this process in real time, once settled."""
     with _recorded() as overrides, Composition(ALL_NODES, overrides) as graph:
         graph.enable()
         graph.serve(_SETTLING_S)
@@ -93,9 +93,9 @@ def composed_graph_is_carried(seconds: float) -> bool:
 
 
 def outlives_visitors(seconds: float) -> bool:
-    """Let participants come and go for so long beside all nodes here at 1 kHz.
+    """Let participants join and leave for some time while all nodes run here at 1 kHz.
 
-    A graph that does not go on prints where its threads are, and ends the process.
+    A graph that hangs prints the stacks of its threads, and ends the process.
     """
     context = multiprocessing.get_context('spawn')
     visits = context.Value('i')
@@ -107,7 +107,7 @@ def outlives_visitors(seconds: float) -> bool:
             end = time.monotonic() + seconds
             while (left := end - time.monotonic()) > 0.0:
                 faulthandler.dump_traceback_later(graph.STUCK_S, exit=True)
-                # A machine that is busy ends motion.
+                # Again, since a busy machine ends the motion.
                 graph.enable()
                 graph.serve(min(left, _SETTLING_S))
             ticks = graph.runtime.ticker.ticks - ticks
@@ -117,15 +117,15 @@ def outlives_visitors(seconds: float) -> bool:
             visitor.terminate()
             visitor.join()
     print(
-        f'{seconds:.0f} s at 1 kHz while {visits.value} participants came and went: {ticks} beats, '
-        f'{state} at the end',
+        f'{seconds:.0f} s at 1 kHz while {visits.value} participants joined and left: {ticks} '
+        f'ticks, {state} at the end',
         flush=True,
     )
     return ticks > 0 and visits.value > 0
 
 
 def _visit(domain: int, visits: Synchronized) -> None:
-    """Join and leave without end, with topics whose QoS does not match the graph's."""
+    """Join and leave in an endless loop, with topics whose QoS does not match the graph's."""
     while True:
         with joined_node('visitor', 'endoscope', domain) as node:
             node.create_publisher(String, STATE_COMMAND, qos_profile_sensor_data)
@@ -146,9 +146,9 @@ def lock_step_speed(seconds: float) -> float:
 def least_cores(
     overrides: Mapping[str, Mapping[str, object]], settling_s: float, seconds: float
 ) -> float:
-    """Least CPU time of all nodes in one process in a second of motion, once settled.
+    """Least CPU time of all nodes in one process for one second of motion, once settled.
 
-    In lock-step: the same ticks with the same messages, however busy the machine is.
+    Lock-step gives the same ticks with the same messages, however busy the machine is.
     """
     with _in_lock_step(overrides, settling_s) as graph:
         costs = []
@@ -156,13 +156,13 @@ def least_cores(
             cpu = time.process_time()
             graph.advance(1.0)
             costs.append(time.process_time() - cpu)
-    # What else a machine does only adds, by its caches.
+    # Other load only adds time, through the caches.
     return min(costs)
 
 
 @contextmanager
 def _recorded() -> Iterator[Mapping[str, Mapping[str, object]]]:
-    """Parameters of a graph that moves and is recorded to a folder that is thrown away."""
+    """Parameters of a graph that moves and is recorded to a temporary folder."""
     with tempfile.TemporaryDirectory() as folder:
         yield {'recorder': {'bag': f'{folder}/bag'}, 'master': _PLAYING}
 
@@ -181,12 +181,12 @@ def _in_lock_step(
 
 @dataclass(frozen=True)
 class Pace:
-    """How a graph in real time has kept up."""
+    """Rate and latency of a graph in real time."""
 
     elapsed: float  # s
     share: float  # of the ticks that were due
-    # From the instant at which the master's tick was due to the motor driver's obeying it: median,
-    # and what 99 % do not exceed, in ms.
+    # Latency in ms from the due time of the master's tick to its execution by the motor driver:
+    # median and 99th percentile.
     middle: float
     late: float
     cores: float
@@ -251,7 +251,7 @@ class Composition(ClosedOnExit):
         self._first.destroy_timer(timer)
 
     def kept_pace(self, seconds: float) -> Pace:
-        """Go on in real time for so long, and see how it keeps up."""
+        """Run in real time for some seconds, and measure the pace."""
         ticker, latency = self.runtime.ticker, self._kept(self.node('motor_driver').latency_ns)
         ticks, missed, cpu = ticker.ticks, ticker.missed, time.process_time()
         began = time.monotonic()
@@ -266,7 +266,7 @@ class Composition(ClosedOnExit):
         return Pace(elapsed, ticks / (ticks + missed), middle, late, cpu / elapsed)
 
     def _kept(self, newest: deque[int]) -> list[int]:
-        """Keep from now on what passes through a queue that a node holds short."""
+        """Collect from now on all values of a queue that a node keeps short."""
         values: list[int] = []
         newest.clear()
 
@@ -291,7 +291,7 @@ _PATIENCE_S = 120.0
 
 
 def processes_are_carried(rate: int, seconds: float) -> bool:
-    """Measure the graph with a process for each node, at beats per second that divide 1000."""
+    """Measure the graph with a process for each node, at a tick rate that divides 1000."""
     domain = private_domain()
     with (
         tempfile.TemporaryDirectory() as folder,
@@ -327,7 +327,7 @@ def processes_are_carried(rate: int, seconds: float) -> bool:
 
 
 def _hops(done: Counter[str]) -> str:
-    # What is missing beyond the refusals was replaced by newer commands before it was read.
+    # Commands missing beyond the refused ones were replaced by newer ones before they were read.
     text = f'the master sent {done["sent"]}'
     for node in _OBEYING:
         refused = [f'{n} {key}' for key, n in done.items() if key.startswith(f'{node} refused')]
@@ -336,7 +336,7 @@ def _hops(done: Counter[str]) -> str:
 
 
 def _enable(operator: Operator) -> None:
-    """Wait until every node is heard and the slave follows commands."""
+    """Wait until every node publishes and the slave follows commands."""
     deadline = time.monotonic() + _PATIENCE_S
     while operator.graph.state != OperatingState.ENABLED or len(operator.graph.heard_ns) < len(
         NODES
@@ -349,7 +349,7 @@ def _enable(operator: Operator) -> None:
 
 
 def _counts(operator: Operator) -> Counter[str]:
-    """Ticks of the motor driver, and of each node what it sent, obeyed and refused."""
+    """Ticks of the motor driver, and the commands each node sent, obeyed and refused."""
     operator.serve(1.1)
     device = operator.graph.health['motor_driver: device'].values
     found = Counter({key: int(device[key]) for key in ('ticks', 'missed ticks')})

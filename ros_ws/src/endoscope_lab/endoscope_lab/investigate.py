@@ -1,4 +1,4 @@
-"""`endoscope bench investigate`: concealed rigs that are asked for motions until explained."""
+"""`endoscope bench investigate`: rigs with injected effects, investigated until explained."""
 
 import argparse
 import math
@@ -49,8 +49,8 @@ Array = NDArray[np.float64]
 
 TICK = 1e-3
 COMMISSIONED, ASKED, FIXED = 'one motion', 'asked', 'fixed'
-"""By what a rig is explained: the commissioning motion, the loop, and one motion that was fixed
-beforehand, as long as all motions of the loop together."""
+"""What a rig is explained by: the commissioning motion, the loop, and one motion fixed beforehand,
+as long as all motions of the loop together."""
 UNDER_WAY = 'under way'
 ONE, TWO = 'one effect', 'two effects'
 KINDS = {TWO: 'pairs', ONE: 'catalogue', 'other simulator': 'other_simulator'}
@@ -64,17 +64,17 @@ COLUMNS = (
 
 @dataclass(frozen=True, kw_only=True)
 class Asked(Row):
-    """What is said of a rig after some motions."""
+    """The judged explanation of a rig after some motions."""
 
     by: str
     experiments: int = 0  # after the commissioning motion
     motion_s: float = math.nan
-    stopped: str = ''  # why no further motion was asked for
-    cpu_s: float = math.nan  # of everything for this row
+    stopped: str = ''  # why no further motion was requested
+    cpu_s: float = math.nan  # of all work for this row
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print a line for each rig and way, then the table; return 1 if a rig failed."""
+    """Print a line for each rig and method, then the table; return 1 if a rig failed."""
     before = rows_so_far(args.json, Asked)
     done = {row.seed for row in before if row.by == FIXED}
     until = time.time() + 60.0 * args.minutes
@@ -90,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
         found += rows
         for row in rows:
             print(f'{row.by:11s}{row.line()}', flush=True)
-    # Of a rig that was begun again, what was said last.
+    # Of a rig that was started again, the last row.
     last = {(row.seed, row.by): row for row in found if row.seed in args.seeds}
     rows = list(last.values())
     print('\n' + table(rows))
@@ -102,9 +102,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def kind_of(seed: int) -> str:
-    """Stratum of a seed: in four, one with a pair, one with one effect, two of the other simulator.
+    """Stratum of a seed: of four, one has two effects, one a single, two the other simulator.
 
-    The pairs are the kernel's own.
+    The pairs are simulated by the kernel.
     """
     return KINDS[('other simulator', TWO, 'other simulator', ONE)[(seed + 1) % 4]]
 
@@ -114,8 +114,8 @@ def asked(
 ) -> list[Asked]:
     """Explain a rig by one motion, by the loop and by a fixed motion, on one core.
 
-    Nothing is begun after `until`, seconds since the epoch, and the loop plays no further motion
-    after `rig_minutes`. Every answer is added to a file, those of the loop as it goes.
+    Nothing starts after `until`, seconds since the epoch, and the loop plays no further motion
+    after `rig_minutes`. Every row is appended to a file, those of the loop as it runs.
     """
     if time.time() > until:
         return []
@@ -124,7 +124,7 @@ def asked(
 
     def keep(by: str, answer: _Answer, experiments: int = 0, stopped: str = '') -> None:
         rows[by] = Asked(
-            **vars(judged_row(case, answer.said, answer.seconds)),
+            **vars(judged_row(case, answer.explanation, answer.seconds)),
             by=by,
             experiments=experiments,
             motion_s=answer.motion_s,
@@ -164,7 +164,7 @@ def asked(
 
 
 def drawn_rig(stratum: str, seed: int) -> tuple[Case, Callable[[Array], Readings]]:
-    """A concealed rig, and what is read of it under a shaft command (N, J), every ms."""
+    """A rig with injected effects, and its readings under a shaft command (N, J), every ms."""
     if stratum == KINDS['other simulator']:
         case, truth = of_other_simulator(np.random.default_rng([seed, 0]), None)
         case = replace(case, stratum=stratum, seed=seed)
@@ -176,16 +176,16 @@ def drawn_rig(stratum: str, seed: int) -> tuple[Case, Callable[[Array], Readings
 
 @dataclass(frozen=True)
 class _Answer:
-    """What is said after some motions."""
+    """An explanation after some motions."""
 
-    said: Explanation
-    motion_s: float  # length of all of them
-    seconds: float  # that explaining took, and of which the processor
+    explanation: Explanation
+    motion_s: float  # length of all motions
+    seconds: float  # time of explaining, and CPU time of it
     cpu_s: float
 
 
 class SimulatedRig:
-    """A concealed rig that is asked for motions, and goes on from one to the next."""
+    """A rig with injected effects that plays requested motions one after the other."""
 
     def __init__(self, case: Case, read: Callable[[Array], Readings], until: float) -> None:
         self._case, self._read, self._until = case, read, until
@@ -196,7 +196,7 @@ class SimulatedRig:
         self.last: _Answer | None = None
 
     def play(self, motion: Motion, file: Path, bag: Path) -> None:
-        """Play what a file asks for; the rig stops by itself where a wire is too tight."""
+        """Play the motion of a file; the rig stops by itself if a wire is too tight."""
         if time.time() > self._until:
             raise NotPlayedError('its time is over')
         recording = self.recorded(read_command_file(file), bag.name)
@@ -216,7 +216,7 @@ class SimulatedRig:
         return case
 
     def recorded(self, table: CommandTable, name: str) -> Recording:
-        """What the sensors read while a motion is played, after those before and a rest."""
+        """Readings of a motion that is played after all earlier ones and a rest."""
         ticks = np.arange(0.0, table.time[-1], TICK)
         columns = [table.joints.index(joint) for joint in self._case.true.joint_names()]
         angle = np.column_stack([np.interp(ticks, table.time, table.angle[:, k]) for k in columns])
@@ -235,12 +235,12 @@ class SimulatedRig:
 
 
 def _rest(ticks: int) -> int:
-    """Ticks of rest after so many: to a whole second, as recordings of one rig are joined."""
+    """Ticks of rest after a motion of some ticks: to a whole second, as recordings are joined."""
     return math.ceil(ticks * TICK + APART_S) * round(1.0 / TICK) - ticks
 
 
 def _since(readings: Readings, begin: int) -> Readings:
-    """What is read from a tick on, at stamps that begin with it."""
+    """Readings from a tick on, with stamps that start at zero."""
     values = {
         key: value[begin // TRACKER_TICKS if key in ('tracker_time', 'bending') else begin :]
         for key, value in vars(readings).items()
@@ -263,16 +263,16 @@ def explained(
     ]
     begun, begun_cpu = time.monotonic(), time.process_time()
     case = explain_case(inputs_joined(inputs), jobs=1)
-    said = replace(
+    explanation = replace(
         case.explanation, verdict=case.verdict, effects=case.effects, augmented=case.plant
     )
     seconds, cpu_s = time.monotonic() - begun, time.process_time() - begun_cpu
-    return case, _Answer(said, motion_s, seconds, cpu_s)
+    return case, _Answer(explanation, motion_s, seconds, cpu_s)
 
 
 def fixed_motion(first: Motion, duration: float) -> CommandTable:
-    """A motion of some length that asks nothing: the first one, then all of the family by turns."""
-    # These are what the loop chooses from, in their order, on one joint after the other.
+    """A motion of some length, fixed beforehand: the first one, then all of the library in turn."""
+    # The library is what the loop chooses from, in its order, on one joint after the other.
     joints, names = first.joint.split(' and '), first.table.joints
     by_joint = [library(joint, tuple(joints), first.largest, shipped_rig()) for joint in joints]
     angles = [each.angle for motions in zip(*by_joint, strict=True) for each in motions]
@@ -291,7 +291,7 @@ def fixed_motion(first: Motion, duration: float) -> CommandTable:
 
 
 def table(rows: Sequence[Asked]) -> str:
-    """A line for each kind of rig and way, and one a way for all rigs."""
+    """A line for each kind of rig and method, and one for each method over all rigs."""
     groups = {name: [stratum] for name, stratum in KINDS.items()}
     groups['all'] = list(KINDS.values())
     lines = [table_head(*COLUMNS)]
@@ -311,7 +311,7 @@ def _cells(rows: Sequence[Asked]) -> tuple[str, ...]:
         known = [value for row in rows if not math.isnan(value := getattr(row, name))]
         return f'{np.mean(known):.{decimals}f}' if known else '-'
 
-    # What failed predicts nothing.
+    # A failed explanation predicts nothing.
     left = np.nan_to_num([row.augmented for row in rows], nan=np.inf)
     cut = sum(row.stopped in (Stop.INTERRUPTED, Stop.FAULT, UNDER_WAY) for row in rows)
     return (

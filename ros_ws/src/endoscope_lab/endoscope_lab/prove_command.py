@@ -1,4 +1,4 @@
-"""`endoscope prove`: conceal something in rigs, explain their recordings, open what was sealed."""
+"""`endoscope prove`: inject effects into rigs, seal the truth, explain, open the seals."""
 
 import argparse
 import secrets
@@ -14,37 +14,39 @@ _SEEDS = 1_000_000
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser = subparsers.add_parser(
         'prove',
-        help='conceal physics in simulated rigs, explain their recordings, and compare',
-        description='Draws rigs, conceals an effect in most of them, and records each twice. '
-        'Writes each truth to a sealed file and prints its SHA-256 first. Then explains every '
-        'recording from itself and the described plant alone, opens the seals, and writes a page '
-        'that shows truth beside answer.',
-    )
-    parser.add_argument('--n', type=COUNT, metavar='N', help='rigs (6; of the slave 2)')
-    parser.add_argument(
-        '--seed', type=seed, help='draws the same rigs again (by default others every time)'
+        help='inject effects into simulated rigs, explain their recordings, and compare',
+        description='Draws rigs, injects an effect into most of them, and records each twice. '
+        'Writes each truth to a sealed file and prints its SHA-256. Then explains every recording '
+        'from itself and the described plant alone, opens the seals, and writes a page that '
+        'compares truths and explanations.',
     )
     parser.add_argument(
-        '--effect', metavar='ID', help='what is concealed in all of them (drawn; or nothing)'
+        '--n', type=COUNT, metavar='N', help='number of rigs (6; of the simulated slave 2)'
+    )
+    parser.add_argument(
+        '--seed', type=seed, help='seed of the rigs (by default a new one every time)'
+    )
+    parser.add_argument(
+        '--effect', metavar='ID', help='effect to inject into all rigs (by default drawn, or none)'
     )
     parser.add_argument(
         '--form',
         choices=SIMULATORS,
         default=OWN,
-        help="rigs of the product's own simulator, or of another one that shares no code with it "
-        'and has laws of its own forms (own)',
+        help="simulator of the rigs: the product's own, or another one that shares no code with it "
+        'and has laws of other forms (own)',
     )
     parser.add_argument(
         '--rig',
         choices=('drawn', SLAVE),
         default='drawn',
-        help='what is recorded: rigs by themselves, or the simulated slave, by the whole running '
-        'graph, which is then moved by the inverse of either plant (drawn)',
+        help='what is recorded: drawn rigs, or the simulated slave by the running graph, which '
+        'then tracks a motion with the inverse of either plant (drawn)',
     )
     parser.add_argument(
-        '--out', type=Path, required=True, metavar='DIR', help='a new or empty folder'
+        '--out', type=Path, required=True, metavar='DIR', help='new or empty folder'
     )
-    parser.add_argument('--jobs', type=COUNT, default=2, metavar='N', help='rigs side by side (2)')
+    parser.add_argument('--jobs', type=COUNT, default=2, metavar='N', help='rigs in parallel (2)')
 
 
 def run(args: argparse.Namespace) -> int:
@@ -67,11 +69,11 @@ def run(args: argparse.Namespace) -> int:
         require_drawn(args.effect, form)
     drawn_by = secrets.randbelow(_SEEDS) if args.seed is None else args.seed
     print(f'seed {drawn_by}: --seed {drawn_by} draws the same rigs again')
-    # Not hidden until all is done: who doubts compares the digests meanwhile.
+    # The folder is visible from the start, so that anyone can compare the digests meanwhile.
     make_parent(args.out)
     args.out.mkdir(exist_ok=True)
     proof = Proof(count, form, drawn_by, args.effect, args.jobs, args.command_line)
-    outcomes = prove(proof, args.out, _say)
+    outcomes = prove(proof, args.out, _print_line)
     facts = {
         'date': datetime.now(UTC).date().isoformat(),
         'command': args.command_line,
@@ -79,10 +81,10 @@ def run(args: argparse.Namespace) -> int:
         'simulator': form,
     }
     write_text(args.out / PAGE, page(outcomes, facts))
-    _say(f'{sentences.headline(outcomes)}.\n{sentences.summary(outcomes)}')
-    _say(f'Page: {args.out / PAGE}')
+    _print_line(f'{sentences.headline(outcomes)}.\n{sentences.summary(outcomes)}')
+    _print_line(f'Page: {args.out / PAGE}')
     return 0
 
 
-def _say(line: str) -> None:
+def _print_line(line: str) -> None:
     print(line, flush=True)

@@ -1,4 +1,4 @@
-"""How much the recorder keeps up with, and what it costs."""
+"""Message rate that the recorder sustains, and its CPU time."""
 
 import os
 import subprocess
@@ -19,7 +19,7 @@ from endoscope_nodes.runtime.environment import stay_on_this_machine
 from endoscope_nodes.runtime.qos import SENSOR_OFFERED
 
 RATES = (5_000, 10_000, 20_000)
-"""Messages a second; the last is the target."""
+"""Messages per second; the last is the target."""
 TARGET_CPU_SHARE = 0.5
 _TOPICS = 20
 _STEP_S = 0.001
@@ -32,7 +32,7 @@ def run(seconds: float) -> int:
 
 
 def _keeps_up(rate: int, seconds: float) -> bool:
-    """Send messages at a rate in 1/s to a recorder process, print, and say if the target is met."""
+    """Send messages at a rate in 1/s to a recorder process, print; whether the target is met."""
     topics = [f'/bench_{os.getpid()}/topic_{k}' for k in range(_TOPICS)]
     with tempfile.TemporaryDirectory() as folder:
         bag = Path(folder) / 'bag'
@@ -45,7 +45,7 @@ def _keeps_up(rate: int, seconds: float) -> bool:
                 sender.wait_for_readers()
                 cpu_before, began = cpu_seconds(recorder.pid), time.monotonic()
                 sent = sender.send(rate, seconds)
-                # One second more, so that the recorder pays for all that it has queued.
+                # One second more, so that the CPU time includes all queued messages.
                 elapsed = time.monotonic() - began
                 time.sleep(1.0)
                 cpu = cpu_seconds(recorder.pid) - cpu_before
@@ -56,8 +56,8 @@ def _keeps_up(rate: int, seconds: float) -> bool:
             raise RuntimeError(f'the recorder failed: {errors}')
         recorded = open_bag(bag).message_count
     print(
-        f'{rate:>8} /s asked  {sent / elapsed:>8.0f} /s sent  {sent - recorded:>7} of {sent} lost  '
-        f'{100 * cpu / elapsed:>5.1f} % of a core',
+        f'{rate:>8} /s wanted  {sent / elapsed:>8.0f} /s sent  '
+        f'{sent - recorded:>7} of {sent} lost  {100 * cpu / elapsed:>5.1f} % of a core',
         flush=True,
     )
     return recorded == sent and cpu / elapsed <= TARGET_CPU_SHARE
@@ -84,7 +84,7 @@ class _Sender:
             if time.monotonic() > deadline:
                 raise RuntimeError('the recorder did not find the topics')
             time.sleep(0.05)
-        # The reader is known to the writer now, but not yet the other way round.
+        # The writer knows the reader now, but the reader may not know the writer yet.
         time.sleep(1.0)
 
     def send(self, rate: int, seconds: float) -> int:
@@ -93,7 +93,7 @@ class _Sender:
         message, publishers = self._message, self._publishers
         while (elapsed := time.monotonic() - began) < seconds:
             due = int(elapsed * rate)
-            # A sender that was held up does not catch up in one burst: a bus does not either.
+            # A delayed sender does not catch up in one burst, as a bus does not either.
             for k in range(sent, min(due, sent + rate // 100)):
                 publishers[k % _TOPICS].publish(message)
                 sent += 1

@@ -1,4 +1,4 @@
-"""Still pictures of documentation and benchmarks: one look for all that matplotlib draws."""
+"""Plots of documentation and benchmarks: one style for all figures of matplotlib."""
 
 import io
 from typing import Any
@@ -36,7 +36,7 @@ STYLE: dict[Any, Any] = {
 
 
 def svg(figure: Figure) -> str:
-    """Return a figure as an `<svg>` element that can stand in a page."""
+    """Return a figure as an `<svg>` element for a page."""
     text = io.StringIO()
     figure.savefig(text, format='svg', metadata={'Date': None})
     content = text.getvalue()

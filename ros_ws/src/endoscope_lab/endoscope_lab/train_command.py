@@ -19,27 +19,33 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         help='train the tension classifier',
         description="Simulates calibrations of random rigs, trains the first paper's 1D-CNN on "
         'them, calibrates its intervals and refusals on other rigs, and writes FILE and a JSON '
-        'file of the same name that says how. Interrupted, the same command goes on from '
-        'FILE.part. It needs PyTorch: `make -C ros_ws train` installs it.',
+        'file of the same name that describes the training. An interrupted training resumes from '
+        'FILE.part with the same command. Needs PyTorch: `make -C ros_ws train` installs it.',
     )
     parser.add_argument(
         '--out',
         type=Path,
         required=True,
         metavar='FILE',
-        help='weights to write, by custom with suffix .safetensors',
+        help='weights to write, usually with suffix .safetensors',
     )
     parser.add_argument(
         '--motion',
         default='sinusoid',
         help="calibration motion: the first paper's sinusoid of 9 s, or brief (sinusoid)",
     )
-    parser.add_argument('--seed', type=seed, default=0, help='of rigs, weights and batches (0)')
     parser.add_argument(
-        '--n', type=COUNT, default=5000, metavar='N', help='rigs to train with (5000)'
+        '--seed', type=seed, default=0, help='seed of rigs, weights and batches (0)'
     )
     parser.add_argument(
-        '--steps', type=COUNT, default=6000, metavar='N', help='steps of 64 recordings (6000)'
+        '--n', type=COUNT, default=5000, metavar='N', help='rigs for training (5000)'
+    )
+    parser.add_argument(
+        '--steps',
+        type=COUNT,
+        default=6000,
+        metavar='N',
+        help='training steps of 64 recordings (6000)',
     )
 
 
@@ -63,12 +69,12 @@ def run(args: argparse.Namespace) -> int:
     described = description_of(trained, settings, args.seed, command)
     _save_weights(out, trained.classifier.weights, described)
     kept.unlink(missing_ok=True)
-    for rate, told in trained.held_out.items():
+    for rate, figures in trained.held_out.items():
         print(
             f'{out}: rigs held out, read at {rate}: nearest class right in '
-            f'{100.0 * told["nearest_class_right"]:.1f} %, {told["size_rmse_deg"]:.2f} deg rms, '
-            f'{100.0 * told["intervals_hold"]:.0f} % of sizes in their interval, '
-            f'{100.0 * told["refused"]:.1f} % refused'
+            f'{100.0 * figures["nearest_class_right"]:.1f} %, {figures["size_rmse_deg"]:.2f} deg '
+            f'rms, {100.0 * figures["intervals_hold"]:.0f} % of sizes in their interval, '
+            f'{100.0 * figures["refused"]:.1f} % refused'
         )
     return 0
 

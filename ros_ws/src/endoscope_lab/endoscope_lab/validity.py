@@ -1,4 +1,4 @@
-"""`endoscope bench validity`: how long a calibration stays good while the rig changes in hours."""
+"""`endoscope bench validity`: how long a calibration stays valid while the rig changes in hours."""
 
 import argparse
 import math
@@ -46,7 +46,7 @@ from endoscope_lab.watch.changing_rig import MovingRig, motion_of, show
 Array = NDArray[np.float64]
 
 HOURS = (0.0, 0.25, 0.5, 1.0, 2.0, 3.0, 4.0)
-"""Of work, at which a rig is calibrated again and moved."""
+"""Hours of work after which a rig is calibrated again and moved."""
 NONE, OLD_CLASS, NEW_CLASS, OLD_PLANT, NEW_PLANT = (
     'none', 'class then', 'class now', 'plant then', 'plant now',
 )  # fmt: skip
@@ -57,7 +57,7 @@ SCHEMES = {
     OLD_PLANT: ('physical', 'plant', False),
     NEW_PLANT: ('physical', 'plant', True),
 }
-"""Mode, by what it was selected, and whether by the calibration of the moment."""
+"""Mode, what selects it, and whether the latest calibration does."""
 _BLOCK = round(BLOCK_S / TICK)
 _BEFORE_S, _AFTER_S = 60.0, 15.0
 _LOST_N, _RETENSIONED, _RUN_IN, _RUN_IN_H, _LOAD_NM = 1.6, 2.0, 0.3, 1.0, 8e-4
@@ -66,7 +66,7 @@ _BENT = ((1.0, 1.0), (2.0, 1.4), (3.0, 0.8), (math.inf, 1.6))
 
 @dataclass(frozen=True)
 class Slow:
-    """What has become of a rig."""
+    """Slow changes of a rig."""
 
     lost: float = 0.0  # pretension of every wire, N
     factor: float = 1.0  # of the sheaths' exponents
@@ -74,9 +74,9 @@ class Slow:
 
 
 def creeping(hour: float) -> Slow:
-    """Wires relax by the logarithm of time, and are tightened again after two hours."""
+    """Wires relax with the logarithm of time, and are tightened again after two hours."""
     since = hour - _RETENSIONED if hour > _RETENSIONED else hour
-    # Two hours lose what the catalogue has as typical. Relaxation goes by the logarithm of time.
+    # In two hours, the typical loss of the catalogue.
     return Slow(lost=_LOST_N * math.log1p(60.0 * since) / math.log1p(60.0 * _RETENSIONED))
 
 
@@ -86,17 +86,17 @@ def running_in(hour: float) -> Slow:
 
 
 def bent(hour: float) -> Slow:
-    """The tube is bent otherwise from time to time."""
+    """The bend of the tube changes from time to time."""
     return Slow(factor=next(factor for until, factor in _BENT if hour < until))
 
 
 def loaded(hour: float) -> Slow:
-    """An instrument is put through the channel after an hour, and a heavier one after three."""
+    """An instrument is inserted into the channel after an hour, and a heavier one after three."""
     return Slow(moment=_LOAD_NM * (0.0 if hour < 1.0 else 1.0 if hour < 3.0 else 2.0))
 
 
 def all_of_it(hour: float) -> Slow:
-    """All at once."""
+    """All changes together."""
     return Slow(
         creeping(hour).lost, running_in(hour).factor * bent(hour).factor, loaded(hour).moment
     )
@@ -118,14 +118,14 @@ class Row:
     cause: str
     seed: int
     hour: float
-    class_deg: int | None  # told by a calibration now
+    class_deg: int | None  # by a new calibration
     size_deg: float | None
-    error_deg: tuple[float, ...]  # rms, by `SCHEMES`; NaN where a calibration said too little
-    told: bool  # whether a watch that knows the rig of the beginning tells the change
+    error_deg: tuple[float, ...]  # rms, by `SCHEMES`; NaN if the calibration lacks what a law needs
+    detected: bool  # whether a watch that knows the initial rig reports the change
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print a table, and draw it if asked for; return 0."""
+    """Print a table, and draw it on request; return 0."""
     causes = tuple(chosen('cause', args.only, CAUSES))
     rows = {(row.cause, row.seed, row.hour): row for row in rows_so_far(args.json, Row)}
     calls = [(c, s) for s in args.seeds for c in causes if (c, s, HOURS[-1]) not in rows]
@@ -143,7 +143,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def aged(cause: str, seed: int) -> list[Row]:
-    """Calibrate, move and watch a rig of a tube that nothing was fitted on, on one core."""
+    """Calibrate, move and watch a rig in a tube that no fit has used, on one core."""
     with threadpool_limits(1):
         tube, classifier, choice = never_seen_tube(seed, 0), load_classifier(), LawChoice(2)
         first = calibrate(tube, classifier)
@@ -157,13 +157,13 @@ def aged(cause: str, seed: int) -> list[Row]:
                 for mode, by, fresh in SCHEMES.values()
             )
             size = None if found.size is None else math.degrees(found.size)
-            told = hour > 0.0 and is_told(tube, slow, first, seed)
-            rows.append(Row(cause, seed, hour, found.class_deg, size, errors, told))
+            detected = hour > 0.0 and is_detected(tube, slow, first, seed)
+            rows.append(Row(cause, seed, hour, found.class_deg, size, errors, detected))
         return rows
 
 
 def plant_after(plant: PlantDescription, slow: Slow) -> PlantDescription:
-    """The plant as it has become."""
+    """The plant after slow changes."""
     joints = {
         name: replace(
             joint,
@@ -180,7 +180,7 @@ def plant_after(plant: PlantDescription, slow: Slow) -> PlantDescription:
 def _error(
     tube: NeverSeenTube, choice: LawChoice, mode: str, by: str, found: CalibrationFindings
 ) -> float:
-    """Rms error in deg of another motion; NaN where the calibration said too little."""
+    """Rms error in deg of another motion; NaN if the calibration lacks what the law needs."""
     try:
         law = choice.law(mode, by, found) if by else FeedforwardLaw()
     except EndoscopeError:
@@ -189,10 +189,10 @@ def _error(
     return math.degrees(run_tracking_trial(tube.plant, signal, law, False, tube.noise).rmse)
 
 
-def is_told(tube: NeverSeenTube, slow: Slow, first: CalibrationFindings, seed: int) -> bool:
-    """Whether a watch tells the change of a rig that it has learnt, within 15 s of motion.
+def is_detected(tube: NeverSeenTube, slow: Slow, first: CalibrationFindings, seed: int) -> bool:
+    """Whether a watch reports the change of a rig that it has learnt, within 15 s of motion.
 
-    It knows the plant that the first calibration identified. What happens in hours happens at once.
+    It uses the plant that the first calibration identified. The slow change happens at once.
     """
     if not first.plants:
         return False
@@ -220,7 +220,7 @@ def is_told(tube: NeverSeenTube, slow: Slow, first: CalibrationFindings, seed: i
 def table(rows: Sequence[Row], causes: Sequence[str]) -> str:
     """A line for each cause and hour, means over tubes."""
     columns = ('cause', 'h', 'tubes', 'same class', 'size, deg', *(f'{s}, deg' for s in SCHEMES))
-    lines = [table_head(*columns, 'watch tells')]
+    lines = [table_head(*columns, 'watch reports')]
     for cause in causes:
         first = {row.seed: row for row in rows if row.cause == cause and row.hour == 0.0}
         for hour in HOURS:
@@ -232,13 +232,13 @@ def table(rows: Sequence[Row], causes: Sequence[str]) -> str:
             means = [_mean(row.error_deg[k] for row in of) for k in range(len(SCHEMES))]
             errors = ['-' if math.isnan(mean) else f'{mean:.1f}' for mean in means]
             size = f'{np.mean(sizes):.0f}' if sizes else '-'
-            told = sum(row.told for row in of)
-            lines.append(table_row(cause, hour, len(of), same, size, *errors, told))
+            detected = sum(row.detected for row in of)
+            lines.append(table_row(cause, hour, len(of), same, size, *errors, detected))
     return '\n'.join(lines)
 
 
 def picture(rows: Sequence[Row], causes: Sequence[str]) -> str:
-    """Errors over hours by each scheme, as SVG, with the share of tubes in which a watch tells."""
+    """Errors over hours by each scheme, with the share of tubes in which a watch reports (SVG)."""
     with rc_context(STYLE):
         figure = Figure(figsize=(8.0, 2.3 * math.ceil(len(causes) / 2)), layout='constrained')
         grid = figure.subplots(math.ceil(len(causes) / 2), 2, sharex=True, squeeze=False)
@@ -251,10 +251,10 @@ def picture(rows: Sequence[Row], causes: Sequence[str]) -> str:
                 colour = 'C3' if 'class' in name else 'C0' if 'plant' in name else '0.5'
                 plot.plot(HOURS, errors, line, color=colour, label=name)
             for hour in HOURS:
-                share = np.mean([row.told for row in of_hour(hour)])
+                share = np.mean([row.detected for row in of_hour(hour)])
                 if share:
-                    told = plot.plot(hour, 0.0, '^', color='C1', alpha=share, clip_on=False)
-                    told[0].set_label('watch tells' if share == 1.0 else '')
+                    mark = plot.plot(hour, 0.0, '^', color='C1', alpha=share, clip_on=False)
+                    mark[0].set_label('watch reports' if share == 1.0 else '')
             plot.set_title(cause)
             plot.set_ylim(bottom=0.0)
             plot.tick_params(labelbottom=True)
@@ -270,7 +270,7 @@ def picture(rows: Sequence[Row], causes: Sequence[str]) -> str:
 
 
 def _mean(values: Iterable[float]) -> float:
-    """Mean of what is a number; NaN where nothing is."""
+    """Mean of the numbers that are not NaN; NaN if there is none."""
     numbers = [value for value in values if not math.isnan(value)]
     return float(np.mean(numbers)) if numbers else math.nan
 

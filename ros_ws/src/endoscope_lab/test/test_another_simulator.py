@@ -1,7 +1,7 @@
-"""The plant beside a simulator that shares no code with it, and what compensation leaves there.
+"""The plant against a simulator that shares no code with it, and the error of compensation there.
 
 Sliding nodes: wires as rows of springs in place of fronts that run along them. For compensation
-the joint's pre-sliding is spread twice as wide as the family's, which no calibration fits.
+the joint's pre-sliding has twice the spread of the family's, which no calibration fits.
 """
 
 from dataclasses import asdict, replace
@@ -139,6 +139,6 @@ def test_the_inverse_helps_most_on_another_simulator_too():
             f'backlash {size_deg:.0f} deg: RMSE {none:.2f} deg; Bouc-Wen of the class leaves '
             f'{by_class / none:.1%}, the inverse {inverse / none:.1%}'
         )
-        # README, the figures and the page of the demonstration say so.
+        # As stated by README, the figures and the page of the demonstration.
         assert 1 <= round(100.0 * inverse / none) <= 2
         assert 16 <= round(100.0 * by_class / none) <= 30

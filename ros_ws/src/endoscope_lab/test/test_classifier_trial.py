@@ -1,4 +1,4 @@
-"""The shipped classifiers judge tubes that they have not seen."""
+"""The shipped classifiers on tubes that they have not seen."""
 
 import numpy as np
 import pytest

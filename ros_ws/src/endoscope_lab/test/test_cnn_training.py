@@ -35,7 +35,7 @@ def test_the_loss_is_least_for_the_truth():
             assert loss_of(wrong, size, 0.02, warm) > loss_of(right, size, 0.02, warm) + 0.5
 
 
-def test_an_interrupted_training_goes_on_to_the_same_weights(tmp_path, monkeypatch):
+def test_an_interrupted_training_resumes_to_the_same_weights(tmp_path, monkeypatch):
     from endoscope_lab.training import cnn_training
 
     monkeypatch.setattr(cnn_training, 'KEPT_EVERY', 2)
@@ -50,7 +50,7 @@ def test_an_interrupted_training_goes_on_to_the_same_weights(tmp_path, monkeypat
     with pytest.raises(KeyboardInterrupt):
         train_cnn('sinusoid', 3, settings, kept, interrupt)
     again = train_cnn('sinusoid', 3, settings, kept, lines.append)
-    assert 'goes on after step 2 of 4' in lines
+    assert 'resumes after step 2 of 4' in lines
     for name, array in whole.classifier.weights.items():
         np.testing.assert_array_equal(array, again.classifier.weights[name])
     assert whole.classifier.calibration == again.classifier.calibration

@@ -1,4 +1,4 @@
-"""The numbers by which explanations are judged, from cases whose truth is known."""
+"""The numbers by which explanations are judged, from cases with known truth."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ def test_too_few_cases_for_a_limit_are_refused():
 
 
 def drawn():
-    """A contest of two names whose truth is as likely as evidence at a temperature says."""
+    """A contest of two names whose truth is as likely as evidence at a temperature makes it."""
     gains = np.sort(RNG.uniform(0.0, 150.0, size=2))[::-1]
     share = 1.0 / (1.0 + np.exp((gains[1] - gains[0]) / TEMPERATURE))
     first = bool(RNG.uniform() < share)
@@ -65,16 +65,16 @@ def test_criteria_follow_from_the_cases(bank, found):
     assert max(rest) < 0.01
 
 
-def test_sets_of_new_cases_hold_the_truth_as_often_as_they_say(found):
+def test_sets_of_new_cases_contain_the_truth_at_their_nominal_rate(found):
     held = []
     for each in (drawn() for _ in range(1000)):
         chances = each.contest.probabilities(found.POSTERIOR)
         right = np.max(chances[np.array(each.right)])
-        held.append(each.said_is_right or np.sum(chances[chances > right]) <= found.MASS)
+        held.append(each.reported_is_right or np.sum(chances[chances > right]) <= found.MASS)
     assert 0.85 < np.mean(held) < 0.97
 
 
-def test_names_are_right_as_often_as_their_probability_says(bank):
+def test_names_are_right_as_often_as_their_probability_states(bank):
     lines = [line.split() for line in reliability(bank).splitlines()[1:-1]]
     assert len(lines) >= 4
     for *_, count, mean, right in lines:

@@ -45,7 +45,7 @@ def test_known_numbers_are_found_again():
     np.testing.assert_allclose(found.readings.load_cell_offset, (0.3, -0.1), atol=0.01)
 
 
-def test_recordings_that_tell_nothing_are_refused():
+def test_uninformative_recordings_are_refused():
     with pytest.raises(InputError, match='no recordings'):
         fit_family([])
     recording = made_up_recording(MADE_UP, 0.0)

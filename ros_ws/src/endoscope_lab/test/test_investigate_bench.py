@@ -1,4 +1,4 @@
-"""Concealed rigs that are asked for motions: what is played, and what counts."""
+"""Rigs with injected effects under investigation: motions that are played."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ RIG = shipped_rig()
         for s in KINDS.values()
     ],
 )
-def test_a_rig_goes_on_from_one_motion_to_the_next(stratum):
+def test_a_rig_continues_from_one_motion_to_the_next(stratum):
     case, read = drawn_rig(stratum, 1)
     joints = case.true.joint_names()
     time = np.arange(0.0, 3.0, 0.01)
@@ -35,7 +35,7 @@ def test_a_rig_goes_on_from_one_motion_to_the_next(stratum):
     first, second = (one.tension.values for one in recordings)
     # A sheath remembers where it has been.
     assert np.abs(first[:20] - second[:20]).max() > 0.2
-    # What was read then is what is read when all of it is done as one.
+    # The readings are those of all motions played as one.
     joined = recordings_joined(recordings)
     again = read(joined_command(joined))
     begin = round(joined.restarts[0].time / 1e-3)
@@ -59,7 +59,7 @@ def joined_command(recording):
 
 
 @pytest.mark.parametrize('joints', [('bend_x',), ('bend_x', 'bend_y')])
-def test_the_fixed_motion_is_allowed_and_begins_as_the_asked_one(joints):
+def test_the_fixed_motion_is_allowed_and_begins_as_the_requested_one(joints):
     plant = PlantDescription().of_joints(joints)
     first = commissioning(plant, RIG)
     longer = fixed_motion(first, 3.0 * first.duration)

@@ -19,7 +19,7 @@ def data(tmp_path_factory):
     return folder
 
 
-def test_the_data_set_says_how_it_was_made(data):
+def test_the_data_set_records_how_it_was_made(data):
     dataset = load_dataset(data)
     assert (dataset.manifest['seed'], dataset.manifest['per_class']) == (5, 2)
     assert len(dataset.class_deg) == 14
@@ -43,7 +43,7 @@ def test_training_leaves_weights_with_how_they_were_made(tmp_path):
     assert load_classifier(out).motion == 'sinusoid'
 
 
-def test_a_data_set_without_room_on_the_disk_is_named(tmp_path):
+def test_a_data_set_without_space_on_the_disk_is_named(tmp_path):
     program = f'{sys.executable} -m endoscope_bringup.cli dataset --n 7 --out data'
     done = subprocess.run(
         ['bash', '-c', f'ulimit -f 20; {program}'],
@@ -57,7 +57,7 @@ def test_a_data_set_without_room_on_the_disk_is_named(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_without_pytorch_one_line_says_how_to_get_it(tmp_path, monkeypatch, capsys):
+def test_without_pytorch_one_line_explains_how_to_install_it(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, 'torch', None)
     for name in ('endoscope_lab.training.cnn_training', 'endoscope_lab.training.network'):
@@ -65,7 +65,7 @@ def test_without_pytorch_one_line_says_how_to_get_it(tmp_path, monkeypatch, caps
     assert main(['train', '--out', 'weights.safetensors']) == 2
     assert capsys.readouterr().err == (
         'endoscope: training the networks of the first paper needs PyTorch: run '
-        '`make -C ros_ws train`, which says how large it is\n'
+        '`make -C ros_ws train`, which reports its size\n'
     )
     assert list(tmp_path.iterdir()) == []
 

@@ -1,4 +1,4 @@
-"""What people take wrongly is said and put right; physics is not taken for it."""
+"""Mistakes of people are reported and corrected; physics is not mistaken for them."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from endoscope_explain.audit import audit_recording
 from endoscope_explain.explanation import Explanation, Verdict
 from endoscope_explain.pipeline import Inputs, Sources, explain_case
 from endoscope_lab.mistakes import drawing
-from endoscope_lab.mistakes.mistake import MISTAKES, is_said
+from endoscope_lab.mistakes.mistake import MISTAKES, is_reported
 
 SHOWN = (
     'tracker',
@@ -23,14 +23,14 @@ SHOWN = (
     'shaft in deg',
     'tension in kg',
 )
-"""One mistake of each kind that is tried for every change: a place, a sign, a clock, a unit."""
-LIKEST = ('tracker_bias', 'load_cell_gain', 'load_cell_delay', 'rate_limit', 'cross_coupling')
-"""Physics that is most like a mistake."""
+"""One mistake of each kind, tried on every change of the code: a place, a sign, a clock, a unit."""
+MOST_SIMILAR = ('tracker_bias', 'load_cell_gain', 'load_cell_delay', 'rate_limit', 'cross_coupling')
+"""Physics that is most similar to a mistake."""
 STRONGEST = [i for i, effect in CATALOGUE.items() if not effect.traits.audited]
 
 
 def first(names, tried):
-    """All of the names, of which only some are tried for every change."""
+    """All names as parameters, of which those not `tried` on every change are nightly."""
     assert {*tried} <= {*names}
     return [
         pytest.param(name, marks=() if name in tried else pytest.mark.nightly) for name in names
@@ -42,16 +42,16 @@ def seed_of(name):
 
 
 @pytest.mark.parametrize('name', first(MISTAKES, SHOWN))
-def test_a_mistake_is_said_and_the_recording_is_handed_on_as_corrected(name):
+def test_a_mistake_is_reported_and_the_corrected_recording_is_explained(name):
     mistake = MISTAKES[name]
     rng = np.random.default_rng(seed_of(name))
     joints = ('bend_x', 'bend_y')[: mistake.joints]
     recording, _ = drawing.draw_recording(rng, joints, 0.1, 0.0, 0)
     plant = drawing.described(recording)
     audit = audit_recording(mistake.change(recording, rng), plant)
-    assert is_said(mistake, audit), [f.text for f in audit.findings]
+    assert is_reported(mistake, audit), [f.text for f in audit.findings]
 
-    # The rig's own forces alone tell what a count of its converter is in N.
+    # Only the rig's own forces show how many N a count of its converter is.
     rel = 0.2 if name == 'tension in counts' else 2e-3
 
     def engine(corrected, *_, **__):
@@ -66,7 +66,7 @@ def test_a_mistake_is_said_and_the_recording_is_handed_on_as_corrected(name):
     assert case.verdict is Verdict.RECORDING_FAULT
 
 
-@pytest.mark.parametrize('effect_id', first(STRONGEST, LIKEST))
+@pytest.mark.parametrize('effect_id', first(STRONGEST, MOST_SIMILAR))
 def test_the_strongest_physics_is_not_taken_for_a_mistake(effect_id):
     rng = np.random.default_rng(seed_of(effect_id))
     joint = {'bend_x': JointParameters()}
@@ -78,6 +78,6 @@ def test_the_strongest_physics_is_not_taken_for_a_mistake(effect_id):
         if survives:
             break
     else:
-        raise AssertionError('no strength that the rig survives')
+        raise AssertionError('the rig survives no strength of the effect')
     audit = audit_recording(recording, PlantDescription(joints=joint))
     assert not audit.mistakes(), [f.text for f in audit.findings]

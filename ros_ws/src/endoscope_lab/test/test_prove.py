@@ -1,4 +1,4 @@
-"""Concealed, sealed, explained, opened: the parts of a proof, and one proof from end to end."""
+"""Injected, sealed, explained, opened: the parts of a proof, and one proof from end to end."""
 
 import hashlib
 import json
@@ -93,21 +93,23 @@ def test_the_same_seed_draws_the_same_rig(form):
 
 def test_a_seal_is_the_digest_of_its_file_and_breaks_with_it(tmp_path):
     path = tmp_path / 'sealed.json'
-    told = seal(path, {'concealed': ['gravity']})
-    assert told == hashlib.sha256(path.read_bytes()).hexdigest()
-    assert opened(path, told)['concealed'] == ['gravity']
-    # The same truth has another digest each time: it cannot be guessed.
-    assert seal(tmp_path / 'again.json', {'concealed': ['gravity']}) != told
+    published = seal(path, {'concealed': ['gravity']})
+    assert published == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert opened(path, published)['concealed'] == ['gravity']
+    # The same truth has another digest each time, so that it cannot be guessed.
+    assert seal(tmp_path / 'again.json', {'concealed': ['gravity']}) != published
     path.write_text(path.read_text().replace('gravity', 'cogging'))
     with pytest.raises(BrokenSealError, match='SHA-256'):
-        opened(path, told)
+        opened(path, published)
 
 
-def outcome(laws, said, after=1.0):
+def outcome(laws, reported, after=1.0):
     line = np.zeros(2)
-    answer = Answer(1, 'So.', tuple(said), 9.0, 5.0, after, Passage('s', 'N', line, line, {}), 1.0)
+    answer = Answer(
+        1, 'So.', tuple(reported), 9.0, 5.0, after, Passage('s', 'N', line, line, {}), 1.0
+    )
     rig = Rig(1, None, '', tuple(laws), frozenset(), 0.2)
-    return Outcome(rig, answer, {}, judged(laws, answer.said))
+    return Outcome(rig, answer, {}, judged(laws, answer.reported))
 
 
 def test_a_proof_from_end_to_end(tmp_path, capsys):
@@ -116,8 +118,8 @@ def test_a_proof_from_end_to_end(tmp_path, capsys):
     assert main(command.split()) == 0
     lines = capsys.readouterr().out.splitlines()
     sealed = next(k for k, line in enumerate(lines) if 'SHA-256' in line)
-    told = next(k for k, line in enumerate(lines) if 'load_cell_gain' in line)
-    assert sealed < told < lines.index('The seals are opened:')
+    named = next(k for k, line in enumerate(lines) if 'load_cell_gain' in line)
+    assert sealed < named < lines.index('The seals are opened:')
     truth = out / 'rig_1' / 'sealed.json'
     assert lines[sealed].endswith(hashlib.sha256(truth.read_bytes()).hexdigest())
     assert json.loads(truth.read_text())['concealed'] == ['load_cell_gain']
@@ -133,13 +135,13 @@ def test_a_slave_has_both_joints_and_nothing_that_spoils_recordings(capsys, tmp_
         assert case.true.joint_names() == case.described.joint_names() == ('bend_x', 'bend_y')
         assert all(law.stage != 'recording' for law in case.laws)
         assert list(truth['joints']) == ['bend_x', 'bend_y']
-    for words, said in (
+    for words, message in (
         ('--rig slave --effect clock_skew', '--effect clock_skew: with --form slave'),
         ('--rig slave --form other', 'mutually exclusive'),
         ('--form other --effect wire_creep', '--effect wire_creep: with --form other'),
     ):
         assert main(['prove', *words.split(), '--out', str(tmp_path / 'proof')]) == 2
-        assert said in capsys.readouterr().err
+        assert message in capsys.readouterr().err
     assert not (tmp_path / 'proof').exists()
 
 

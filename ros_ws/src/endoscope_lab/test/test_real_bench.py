@@ -1,4 +1,4 @@
-"""Real recordings as `explain` takes them; skipped where they are not at hand."""
+"""Real recordings as `explain` takes them; skipped if they are not available."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from endoscope_core.physics.simulator import simulate
 from endoscope_core.rig import shipped_rig
 from endoscope_lab.papers.real_recordings import recordings_folder
 from endoscope_lab.real.pieces import late_cells
-from endoscope_lab.real.rig import PLANT, Plant, Told, as_described, wide
+from endoscope_lab.real.rig import PLANT, JudgedTake, Plant, as_described, wide
 from endoscope_lab.real.takes import KGF, Take, between_cycles, read
 
 FOLDER = recordings_folder()
@@ -37,8 +37,8 @@ def simulated():
 def test_the_described_plant_leaves_next_to_nothing_of_its_own_recording(simulated):
     observation = simulated.observation()
     model = wide(observation)
-    told = Told(simulated, 5.0, {'nominal': Plant(model, as_described(model))})
-    angle, first, second = told.left('nominal')
+    judged = JudgedTake(simulated, 5.0, {'nominal': Plant(model, as_described(model))})
+    angle, first, second = judged.left('nominal')
     assert np.rad2deg(angle) < 0.1
     assert max(first, second) < 0.03
 

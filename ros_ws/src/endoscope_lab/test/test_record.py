@@ -1,4 +1,4 @@
-"""The record of explained cases: what is kept, and what a later run differs in."""
+"""The record of explained cases: what is stored, and how a later run differs."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from endoscope_lab.concealed.trial import failed
 ROW = replace(
     failed('sinusoid', 7, ValueError('a test')),
     verdict='missing_physics',
-    said=('gravity@bend_x',),
+    reported=('gravity@bend_x',),
     nominal=60.0,
     refitted=7.0,
     augmented=1.05,
@@ -32,9 +32,9 @@ def record(tmp_path):
 
 def test_a_row_is_read_as_it_was_kept(record):
     keep_row(record, replace(ROW, seed=8))
-    assert {key: row.said for key, row in rows_of(record).items()} == {
-        ('sinusoid', 7): ROW.said,
-        ('sinusoid', 8): ROW.said,
+    assert {key: row.reported for key, row in rows_of(record).items()} == {
+        ('sinusoid', 7): ROW.reported,
+        ('sinusoid', 8): ROW.reported,
     }
     assert rows_of(record)['sinusoid', 7].errors == ROW.errors
 
@@ -46,8 +46,8 @@ def test_a_line_that_was_cut_is_named(record):
 
 
 @pytest.mark.nightly
-def test_a_run_goes_on_where_it_was_stopped_and_says_what_differs(record, capsys):
-    # The rows on record say what no explanation of this case would say.
+def test_a_run_resumes_where_it_was_stopped_and_reports_differences(record, capsys):
+    # No explanation of this case would give the rows on record.
     words = ['bench', 'concealed', '--against', str(record)]
     assert main([*words, '--json', str(record)]) == 0, 'the case is not explained again'
     assert '0 differences' in capsys.readouterr().out

@@ -1,10 +1,10 @@
-"""What hours of work make of a rig, and whether it is told."""
+"""Slow changes of a rig in hours of work, and whether they are detected."""
 
 import pytest
 
 from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_lab.papers.tracking_trial import calibrate, never_seen_tube
-from endoscope_lab.validity import Slow, creeping, is_told, plant_after
+from endoscope_lab.validity import Slow, creeping, is_detected, plant_after
 
 
 def test_wires_that_are_tightened_again_creep_again():
@@ -12,7 +12,7 @@ def test_wires_that_are_tightened_again_creep_again():
     assert creeping(2.01).lost < 0.2 < creeping(2.5).lost < creeping(4.0).lost
 
 
-def test_what_has_become_of_a_rig_is_a_plant():
+def test_slow_changes_of_a_rig_give_a_plant():
     tube = never_seen_tube(1, 0)
     now = plant_after(tube.plant, Slow(lost=1.0, factor=1.5, moment=1e-3))
     for name, joint in tube.plant.joints.items():
@@ -21,9 +21,9 @@ def test_what_has_become_of_a_rig_is_a_plant():
     assert [effect.id for effect in now.effects] == ['external_load'] * len(now.joints)
 
 
-def test_a_tube_that_is_bent_anew_is_told_and_one_that_stays_is_not():
+def test_a_tube_that_is_bent_again_is_detected_and_one_that_stays_is_not():
     tube = never_seen_tube(1, 0)
     first = calibrate(tube, load_classifier())
     assert first.plants
-    assert is_told(tube, Slow(factor=1.6), first, 1)
-    assert not is_told(tube, Slow(), first, 1)
+    assert is_detected(tube, Slow(factor=1.6), first, 1)
+    assert not is_detected(tube, Slow(), first, 1)

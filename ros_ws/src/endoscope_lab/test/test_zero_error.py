@@ -19,7 +19,7 @@ def test_a_wire_that_goes_slack_shows_the_zero_of_its_cell(motion):
     np.testing.assert_allclose(zero_errors(tension + OFFSETS), OFFSETS, atol=0.03)
 
 
-def test_only_what_is_much_is_told():
+def test_only_large_zero_errors_are_reported():
     assert words_of(OFFSETS, WIRES) == (
         'zero of a load cell is off: x_pos by +0.58 N, x_neg by -0.40 N; set it again'
     )

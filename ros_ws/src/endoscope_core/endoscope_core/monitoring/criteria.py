@@ -1,4 +1,4 @@
-"""Gains of the likelihood's logarithm at which a change of each part is told.
+"""Gains of the likelihood's logarithm at which a change of each part is reported.
 
 From 10 h of motion of rigs that stay as they are, by
 `endoscope bench watch --derive --nominal 2101-2160`.

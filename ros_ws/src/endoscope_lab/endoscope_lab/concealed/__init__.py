@@ -1,1 +1,1 @@
-"""Rigs with something concealed, what is said of them, and whether it is right."""
+"""Blind benchmark: rigs with injected effects, their explanations, and how far these are right."""

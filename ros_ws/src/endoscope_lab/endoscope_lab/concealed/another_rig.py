@@ -1,9 +1,9 @@
 """A rig of another simulator: sliding nodes, and laws whose forms are not those of the catalogue.
 
 Explaining a recording of the kernel's own laws is an inverse crime (Colton, Kress, Inverse Acoustic
-and Electromagnetic Scattering Theory, 1992): it shows that the search finds what it holds. Here the
-wires are rows of springs, the numbers of the rig are read by the same names, and every law is
-written again in a form of its own.
+and Electromagnetic Scattering Theory, 1992), since the search contains the exact laws. Here the
+wires are rows of springs, the parameters of the rig have the same names, and every law has another
+form.
 """
 
 import math
@@ -24,23 +24,23 @@ Array = NDArray[np.float64]
 Generator = np.random.Generator
 
 TICK = 1e-3
-"""Of commands and servo, s."""
+"""Time step of commands and servo, s."""
 EVERY = 5
-"""Of these, ticks of the wires: they have no inertia, and in 5 ms hardly any way to turn back."""
+"""Ticks in a time step of the wires, which have no inertia and hardly reverse within 5 ms."""
 NODES, FEW_NODES = 100, 12
-"""Of a wire; with the few a law's strength is found.
+"""Nodes of a wire, for recordings and for finding the strength of a law.
 
-Just after a turn the spring at a wire's end follows a chord of the true curve. Beside a continuous
-sheath the tensions of a commissioning motion are off by 0.020 N (rms) with 30 nodes, as much as a
-cell's noise, by 0.0038 N with 100, and by 0.0035 N, which is that of the ticks, with 300.
+Just after a reversal the spring at a wire's end follows a chord of the true curve. Compared with a
+continuous sheath, the tensions of a commissioning motion differ by 0.020 N (rms) with 30 nodes, as
+much as a cell's noise, by 0.0038 N with 100, and by 0.0035 N, due to the ticks, with 300.
 """
 
 
 @dataclass(frozen=True)
 class Laws:
-    """What acts in a rig beside its nominal physics; by default nothing does."""
+    """Laws of a rig beyond its nominal physics; none by default."""
 
-    late_s: float = 0.0  # commands take effect so much later
+    late_s: float = 0.0  # delay of commands
     play_rad: float = 0.0  # between the gear's flanks
     # The pulley runs ahead by eccentric_rad (sin(cycles shaft + phase) - sin phase).
     eccentric_rad: float = 0.0
@@ -57,8 +57,8 @@ class Laws:
     bent_anew: float = 0.0
     bent_at_s: float = 0.0
     bent_within_s: float = 1.0
-    # The exponent is larger by the share running_in / (1 + way / running_in_m)^2 after some way
-    # wound.
+    # The exponent is larger by the share running_in / (1 + d / running_in_m)^2 after a wound
+    # distance d.
     running_in: float = 0.0
     running_in_m: float = 1.0
     # See `Acting`.
@@ -66,8 +66,8 @@ class Laws:
     weight_rad: float = 0.0
     stop_rad: float = math.inf
     stop_stiffness: float = 0.0
-    # Moment of a breath that dwells at its end: breath_nm (1 - 2 |cos|^3) of half the cycle (Lujan
-    # et al., Med. Phys. 26, 1999).
+    # Moment of breathing that dwells at the end: breath_nm (1 - 2 |cos|^3) of half the cycle
+    # (Lujan et al., Med. Phys. 26, 1999).
     breath_nm: float = 0.0
     breath_hz: float = 1.0
     breath_phase: float = 0.0
@@ -75,11 +75,11 @@ class Laws:
     push_nm: float = 0.0
     push_at_s: float = 0.0
     push_within_s: float = 1.0
-    filter_s: float = 0.0  # the tracker tells the mean of so long
-    # The tracker reads more by field_rad (1 - exp(-(angle / field_width)^2)).
+    filter_s: float = 0.0  # window of the tracker's moving average
+    # The tracker adds field_rad (1 - exp(-(angle / field_width)^2)).
     field_rad: float = 0.0
     field_width: float = 1.0
-    # The first cell reads this factor, and warms up by warming_n (1 - exp(-t / warming_s)); both
+    # The first cell has this gain and drifts by warming_n (1 - exp(-t / warming_s)); both cells
     # read a share of their neighbour.
     gain: float = 1.0
     warming_n: float = 0.0
@@ -91,13 +91,12 @@ class Laws:
 class Form:
     """How a law is drawn."""
 
-    words: str  # what it is, as a mechanic says it
-    strength: str  # the number of `Laws` by which it is strong
-    # By how much that differs from nothing where the search for a strength begins.
-    begin: float
-    # Ends between which its other numbers are drawn by their logarithm, phases evenly.
+    words: str  # plain description
+    strength: str  # field of `Laws` that sets its strength
+    begin: float  # offset of that field from zero strength, at the start of the search
+    # Ranges in which its other numbers are drawn, log-uniformly, phases uniformly.
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    # The same in shares of the recording's length, and of the largest angle that the tip reaches.
+    # The same as shares of the recording's length, and of the largest angle of the tip.
     within: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     reached: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
@@ -119,7 +118,7 @@ FORMS: dict[str, Form] = {
         'the sheath sticks at low speed', 'sticking', 0.5, {'sticking_speed': (3e-4, 2e-3)}
     ),
     'configuration_change': Form(
-        'the tube is bent anew meanwhile',
+        'the tube is bent again during the recording',
         'bent_anew',
         0.3,
         {'bent_within_s': (0.05, 0.5)},
@@ -139,31 +138,31 @@ FORMS: dict[str, Form] = {
         'the patient breathes', 'breath_nm', 5e-4, {'breath_hz': (0.15, 0.5), 'breath_phase': _TURN}
     ),
     'external_load': Form(
-        'something begins to push at the tip',
+        'an external force starts to push at the tip',
         'push_nm',
         8e-4,
         {'push_within_s': (0.02, 0.2)},
         {'push_at_s': _HALF},
     ),
-    'tracker_delay': Form('the tracker tells a mean over time', 'filter_s', 0.08),
+    'tracker_delay': Form('the tracker reports a moving average', 'filter_s', 0.08),
     'tracker_distortion': Form(
         'metal bends the field of the tracker',
         'field_rad',
         0.05,
         reached={'field_width': (0.3, 1.2)},
     ),
-    'load_cell_gain': Form('a load cell has another gain', 'gain', 0.1),
+    'load_cell_gain': Form('a load cell has a wrong gain', 'gain', 0.1),
     'load_cell_drift': Form('a load cell warms up', 'warming_n', 0.5, {'warming_s': (20.0, 60.0)}),
-    'load_cell_crosstalk': Form('load cells read their neighbour too', 'neighbour', 0.08),
+    'load_cell_crosstalk': Form('load cells also read their neighbour', 'neighbour', 0.08),
 }
-"""By the effect of the catalogue that is their right name."""
+"""Forms by the effect of the catalogue that is their right name."""
 
 
 def drawn_laws(
     generator: Generator, name: str, duration: float, reached: float
 ) -> Callable[[float], Laws]:
-    """Draw all about a law but its strength, for a duration in s and a largest angle in rad."""
-    # At a strength of zero there is none, at one it is its `begin`.
+    """Draw a law except for its strength, for a duration in s and a largest angle in rad."""
+    # A strength of zero is no law, a strength of one is its `begin`.
     form = FORMS[name]
     chosen: dict[str, Any] = {}
     for key, ends in form.ranges.items():
@@ -181,7 +180,7 @@ def drawn_laws(
 
 
 def read(joint: JointParameters, laws: Laws, command: Array, nodes: int = NODES) -> Readings:
-    """Read a rig of one joint without noise under a motor shaft command (N, 1) in rad, every ms."""
+    """Readings of a rig of one joint without noise, for shaft commands (N, 1) in rad, every ms."""
     numbers: dict[str, Any] = asdict(joint)
     time = np.arange(len(command), dtype=np.float64) * TICK
     asked = _late(command[:, 0], laws.late_s)
@@ -213,7 +212,7 @@ def _late(command: Array, late_s: float) -> Array:
 
 
 def _pulley(shaft: Array, laws: Laws) -> Array:
-    """Angle of the pulley: carried by one flank or the other, and by an eccentric wheel."""
+    """Angle of the pulley, driven by one flank or the other, and by an eccentric wheel."""
     pulley, at = np.empty_like(shaft), shaft[0]
     half = 0.5 * laws.play_rad
     for k, angle in enumerate(shaft.tolist()):
@@ -249,7 +248,7 @@ def _step(time: Array, at: float, within: float) -> Array:
 def _tracker(angle: Array, laws: Laws) -> Array:
     count = round(laws.filter_s / TICK)
     if count > 1:
-        # The mean of what has been, not of what comes.
+        # A causal mean, of past values.
         angle = uniform_filter1d(angle, count, mode='nearest', origin=(count - 1) // 2)
     return angle + laws.field_rad * (1.0 - np.exp(-((angle / laws.field_width) ** 2)))
 

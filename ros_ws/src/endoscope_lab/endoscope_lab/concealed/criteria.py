@@ -1,4 +1,4 @@
-"""The numbers by which explanations are judged, derived from cases whose truth is known."""
+"""The numbers by which explanations are judged, derived from cases with known truth."""
 
 import math
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from endoscope_lab.concealed.sets import JudgedContest
 
 
 def derive(rows: Sequence[Row], write: Path | None) -> None:
-    """Print what the criteria of rows would do, and write them if asked; EndoscopeError if few."""
+    """Print criteria derived from rows, and write them if asked; EndoscopeError if rows are few."""
     bank = bank_of(rows)
     try:
         criteria = derived(bank)
@@ -37,7 +37,7 @@ def derive(rows: Sequence[Row], write: Path | None) -> None:
 
 
 def _in_words(seeds: list[int]) -> str:
-    """Increasing numbers, each stretch by its ends."""
+    """Increasing numbers, with consecutive ones as a range."""
     begins = [n for n in seeds if n - 1 not in seeds]
     ends = [n for n in seeds if n + 1 not in seeds]
     return ', '.join(f'{a} to {b}' if a < b else f'{a}' for a, b in zip(begins, ends, strict=True))
@@ -46,15 +46,15 @@ def _in_words(seeds: list[int]) -> str:
 Array = NDArray[np.float64]
 
 HOLDS = 0.9
-"""Chance with which intervals hold the true number."""
+"""Coverage of intervals."""
 ADEQUATE = 0.95
 """Share of right explanations that are called adequate."""
 PARTS = 10
 PRIOR = np.array([3.0, 1.0, 1.0, 1.0, 3.0, 3.0, 1.0, 3.0, 3.0])
-"""Standard deviations of the weights before anything is known: evidence in nats goes with no more
-than a power of one of anything, and odds are e to a few."""
+"""Prior standard deviations of the weights: evidence in nats scales with any quantity by a power of
+about one at most, and odds are a few powers of e."""
 LEAST = 1e-6
-"""Probability below which being wrong costs no more: one case must not decide alone."""
+"""Probability below which a wrong name costs no more, so that one case cannot decide alone."""
 
 
 @dataclass(frozen=True)
@@ -70,19 +70,18 @@ class Criteria:
 
 @dataclass(frozen=True)
 class Bank:
-    """What the cases say, with NaN left out."""
+    """Results of the cases, without NaN."""
 
-    beyond: Array  # (k,), what is left over what another form leaves
-    exact: NDArray[np.bool_]  # (k,), whether all was said rightly
-    errors: Array  # (l,), of numbers, over what intervals of an `INTERVAL_WIDTH` of one allow
+    beyond: Array  # (k,), residual over that of rigs of another form
+    exact: NDArray[np.bool_]  # (k,), whether the report was exactly right
+    errors: Array  # (l,), of numbers, over the half-width of intervals of an `INTERVAL_WIDTH` of 1
     contests: tuple[JudgedContest, ...]
     case: NDArray[np.int64]  # (m,), number of each contest's case
 
     @cached_property
     def crossed(self) -> list[tuple[JudgedContest, tuple[float, ...], float]]:
-        """Each contest with the weights, and the chance of a function's name, of other cases."""
-        # By its own case's weights, what is right would seem likelier than it is. Cases are left
-        # out by tenths.
+        """Each contest with weights, and the chance of a function's name, from other cases."""
+        # Cross-validation by tenths: weights from the same case would overrate what is right.
         found = []
         for part in range(PARTS):
             own = self.case % PARTS == part
@@ -110,9 +109,9 @@ def bank_of(rows: Sequence[Row]) -> Bank:
 
 
 def derived(bank: Bank) -> Criteria:
-    """Criteria from a bank of cases; ValueError if it has too few for the quantiles."""
+    """Derive criteria from a bank of cases; ValueError if it has too few for the quantiles."""
     return Criteria(
-        # What no more than another form leaves is adequate, whatever right explanations leave.
+        # A residual no larger than that of rigs of another form is always adequate.
         max(conformal(bank.beyond[bank.exact], ADEQUATE), 1.0),
         conformal(bank.errors, HOLDS),
         _likeliest(bank.contests),
@@ -122,25 +121,25 @@ def derived(bank: Bank) -> Criteria:
 
 
 def _name_of_function(contests: Sequence[JudgedContest]) -> float:
-    """How often the name is right where a function at its place is, by Laplace's rule."""
-    named = [each.said_is_right for each in contests if each.is_of_function]
+    """Share of right names where a function at their place is right, by Laplace's rule."""
+    named = [each.reported_is_right for each in contests if each.is_of_function]
     return (1.0 + sum(named)) / (2.0 + len(named))
 
 
 def _before_truth(bank: Bank) -> Array:
-    """Probability (m,) of all that is likelier than the truth; nothing is where that is said."""
+    """Probability (m,) of all names likelier than the truth; zero where the truth is reported."""
     found = []
     for each, weights, _ in bank.crossed:
         chances = each.contest.probabilities(weights)
         right = float(np.max(chances[np.array(each.right)], initial=0.0))
         above = float(np.sum(chances[chances > right]))
-        # What is said is in every set.
-        found.append(0.0 if each.said_is_right else above)
+        # A reported name is in every set.
+        found.append(0.0 if each.reported_is_right else above)
     return np.array(found)
 
 
 def _likeliest(contests: Sequence[JudgedContest]) -> tuple[float, ...]:
-    """Weights under which what is right is most likely, with a prior that bounds them."""
+    """Weights under which the right names are likeliest, with a prior that bounds them."""
     tried = [each.contest for each in contests]
     most = max(len(each.names) for each in tried)
     gains = np.full((len(tried), most), -np.inf)
@@ -164,10 +163,10 @@ def _likeliest(contests: Sequence[JudgedContest]) -> tuple[float, ...]:
 
 
 def reliability(bank: Bank) -> str:
-    """How often names are right that were given with some probability, a line for each tenth."""
+    """Calibration table: share of right names by reported probability, a line for each tenth."""
     named = [each for each in bank.crossed if each[0].contest.found]
-    chances = np.array([c.contest.probability(c.said, w, share) for c, w, share in named])
-    is_right = np.array([c.said_is_right for c, *_ in named], dtype=bool)
+    chances = np.array([c.contest.probability(c.reported, w, share) for c, w, share in named])
+    is_right = np.array([c.reported_is_right for c, *_ in named], dtype=bool)
     lines = [f'{"probability":>14s}{"names":>7s}{"mean":>8s}{"right":>8s}']
     for tenth in range(10):
         inside = np.minimum((10.0 * chances).astype(int), 9) == tenth
@@ -182,7 +181,7 @@ def reliability(bank: Bank) -> str:
 
 
 def conformal(scores: Array, chance: float) -> float:
-    """Limit that the next score does not exceed with a chance; ValueError if scores are too few."""
+    """Limit that the next score stays below with a chance; ValueError if scores are too few."""
     rank = math.ceil((len(scores) + 1) * chance)
     if rank > len(scores):
         raise ValueError(f'{len(scores)} scores are too few for a chance of {chance}: give more')
@@ -190,11 +189,11 @@ def conformal(scores: Array, chance: float) -> float:
 
 
 def sensitivity(bank: Bank, criteria: Criteria) -> str:
-    """What half and double of each number would do on the bank, a line each."""
-    lines = [f'{"":14s}{"half":>24s}{"derived":>24s}{"double":>24s}  says']
+    """Effect of halving and doubling each number on the bank, a line each."""
+    lines = [f'{"":14s}{"half":>24s}{"derived":>24s}{"double":>24s}  meaning']
 
-    def line(name: str, says: str, of: list[str]) -> None:
-        lines.append(f'{name:14s}' + ''.join(f'{each:>24s}' for each in of) + f'  {says}')
+    def line(name: str, meaning: str, of: list[str]) -> None:
+        lines.append(f'{name:14s}' + ''.join(f'{each:>24s}' for each in of) + f'  {meaning}')
 
     def adequate(limit: float) -> str:
         right, wrong = bank.beyond[bank.exact], bank.beyond[~bank.exact]
@@ -219,7 +218,7 @@ def sensitivity(bank: Bank, criteria: Criteria) -> str:
 
 
 def source(criteria: Criteria, made_by: str) -> str:
-    """The module that holds them."""
+    """Source of the module that holds the criteria."""
     origin = fill(f'Made by {made_by}.', 100)
     return f'''"""Numbers by which explanations are judged, derived from cases whose truth is known.
 
@@ -227,17 +226,17 @@ def source(criteria: Criteria, made_by: str) -> str:
 """
 
 BEYOND_FORM = {criteria.BEYOND_FORM:.3g}
-"""What is left over what the worst rig of another form leaves, of the worst channel: one, or what
-{ADEQUATE:.0%} of right explanations stay below."""
+"""Limit of the residual over that of the worst rig of another form, for the worst channel: one, or
+what {ADEQUATE:.0%} of right explanations stay below."""
 INTERVAL_WIDTH = {criteria.INTERVAL_WIDTH:.3g}
-"""Factor on intervals that makes them hold {HOLDS:.0%} of the true numbers."""
+"""Factor on intervals that makes them contain {HOLDS:.0%} of the true numbers."""
 POSTERIOR = ({', '.join(f'{weight:.3g}' for weight in criteria.POSTERIOR)})
 """Weights of the logarithm of the temperature of evidence: of one, and of the logarithms of the
-largest gain, of what form is worth, and of what is left over what another form leaves. Then of the
-odds of nothing: of one, of whether something is said to be missing, and of the logarithm of the
-largest gain. Then of those of something else: of one, and of what is left."""
+largest gain, of the gain of the form, and of the residual over that of rigs of another form. Then
+of the odds of nothing: of one, of whether something is reported missing, and of the logarithm of
+the largest gain. Then of the odds of something else: of one, and of the residual."""
 MASS = {criteria.MASS:.3g}
-"""Probability of the likeliest names up to which a set takes one more."""
+"""Probability of the likeliest names up to which a prediction set takes one more."""
 NAME_OF_FUNCTION = {criteria.NAME_OF_FUNCTION:.3g}
-"""Chance that a function is a form of the effect whose formula comes nearest at its place."""
+"""Chance that a function is a form of the effect whose formula is nearest at its place."""
 '''

@@ -1,4 +1,4 @@
-"""Laws to conceal: drawn expression trees of one state, and effects with numbers drawn for them."""
+"""Laws to inject: drawn expression trees of one state, and effects with drawn parameters."""
 
 import math
 from collections.abc import Callable
@@ -38,30 +38,30 @@ from endoscope_core.physics.simulator import TICK
 
 Array = NDArray[np.float64]
 Tree = Callable[[str], str]
-"""From the text of the argument, about -1 to 1, to that of the formula."""
+"""Maps the text of the argument, of about -1 to 1, to that of the formula."""
 Form = Callable[[float], TermSpec]
-"""From the strength of a law to the law."""
+"""Maps the strength of a law to the law."""
 
 DEPTH = 3
 LONGEST = 150
-"""Characters of a tree; a place that takes odd functions has it twice."""
+"""Characters of a tree, which occurs twice at a place of odd functions."""
 LIKE_A_LINE = 0.8
-"""Share of a form that a line may make over the visited range: lines are stiffness and gain."""
+"""Largest share of a form that a line explains: lines are stiffness and gain."""
 GRID = 400
 _TRIES = 1000
 PERIODS_S = (1.5, 6.0)
 CYCLES = (3.0, 10.0)
-"""Of a law that repeats with the shaft, over the shaft's range."""
+"""Periods, over the shaft's range, of a law that is periodic in the shaft's angle."""
 LAGS_S = (0.3, 6.0)
-"""Time constants of arguments that lag."""
+"""Range of time constants of lagging arguments."""
 EVERY = 10
-"""Ticks from one look at the states to the next."""
+"""Ticks between samples of the states."""
 _EDGE = 0.005
-"""Quantile at which the range of a speed ends."""
+"""Quantile that bounds the range of a speed."""
 
 
 def drawn_tree(generator: np.random.Generator, depth: int = DEPTH) -> Tree:
-    """Draw from + - *, tanh, exp(-x^2), powers of the size, a rational function and a sine."""
+    """Draw from + - *, tanh, exp(-x^2), powers of |x|, a rational function and a sine."""
 
     def leaf() -> Tree:
         slope = generator.choice([-1.0, 1.0]) * np.exp(generator.uniform(-0.4, 1.1))
@@ -86,9 +86,9 @@ def drawn_tree(generator: np.random.Generator, depth: int = DEPTH) -> Tree:
 def drawn_form(
     generator: np.random.Generator, place_id: str, joint: str, visited: tuple[float, float]
 ) -> tuple[Form, float]:
-    """Draw a law by its strength (rms in the unit of the place), and the most that it may have."""
-    # Over the visited range of the place's argument it is not a line; of an argument that repeats,
-    # the period is drawn within that range.
+    """Draw a law by its strength (rms in the unit of the place), and its largest strength."""
+    # It is not a line over the visited range of the place's argument; for a periodic argument, the
+    # period is drawn within that range.
     place = FUNCTIONS[place_id]
     for _ in range(_TRIES):
         low, high = _range(generator, place, visited)
@@ -115,7 +115,7 @@ def drawn_form(
             return _law(place, joint, text, strength / rms, ends, lag)
 
         return form, largest * rms
-    raise RuntimeError(f'no form of {_TRIES} can stand at {place_id}')
+    raise RuntimeError(f'none of {_TRIES} forms is valid at {place_id}')
 
 
 def _law(
@@ -155,7 +155,7 @@ def _text(generator: np.random.Generator, place: Place, low: float, high: float)
 
 
 def _centred(text: str, place: Place, low: float, high: float) -> str:
-    """Without its mean, which is the exponent, the rest angle or the offset itself."""
+    """A formula minus its mean, which is the exponent, the rest angle or the offset itself."""
     mean = float(np.mean(evaluate(text, place.argument.symbol, np.linspace(low, high, GRID))))
     return f'{text} - {mean:.9g}'
 
@@ -170,11 +170,11 @@ def _share_of_a_line(grid: Array, values: Array) -> float:
 def visited(
     plant: PlantDescription, command: Array, joint: str
 ) -> dict[Argument, tuple[float, float]]:
-    """Range of every place's argument, or of its period, under a command (N, J) in rad, each ms."""
+    """Range of every place's argument, or its period, under a command (N, J) in rad, every ms."""
     names = plant.joint_names()
     distance = TermSpec(joint, 'exponent_of_distance', '0*d')
     if all((term.joint, term.place) != (joint, distance.place) for term in plant.terms):
-        # Some states are kept only where a function depends on one of them.
+        # Some states are simulated only if a function depends on one of them.
         plant = replace(plant, terms=(*plant.terms, distance))
     parameters, flags = pack(plant)
     inputs = np.zeros((len(names), len(command), INPUTS))
@@ -220,31 +220,31 @@ def visited(
 
 
 Formula = Callable[[float], EffectSpec]
-"""From the strength to the effect; at zero it vanishes."""
+"""Maps the strength to the effect, which vanishes at zero."""
 
 DRAWN = tuple(each.id for each in CATALOGUE.values() if not each.traits.audited)
-"""Effects that are drawn: all but those that only an audit of a bag can see."""
+"""Effects that are drawn: all except those that only an audit of a bag detects."""
 OF_THE_OTHER = frozenset(
     each.id
     for each in CATALOGUE.values()
     if any(FUNCTIONS[place].argument is OTHER_ANGLE for place in each.traits.families)
 )
-"""Effects that the other joint causes."""
+"""Effects caused by the other joint."""
 _WIDEST = 1e3
-"""Ratio of a parameter's starts above which there is nothing between them."""
+"""Ratio of a parameter's starting values above which none is drawn between them."""
 WIDER = 1.5
-"""Factor by which what is drawn reaches beyond where a search begins, on either side."""
+"""Factor by which drawn values exceed the starting values of a search, on either side."""
 _WITHIN = (0.25, 0.7)
-"""Share of the recording in which something happens."""
+"""Range of onsets, as shares of the recording."""
 
 
 def drawn_formula(
     generator: np.random.Generator, effect_id: str, joint: str, duration: float
 ) -> Formula:
-    """Draw everything about an effect but its strength, for a recording of a duration in s."""
+    """Draw an effect except for its strength, for a recording of a duration in s."""
     effect = CATALOGUE[effect_id]
-    # What makes the effect vanish is its strength: some of the parameters that do so are drawn, and
-    # grow together. An effect that is a limit comes the nearer the stronger it is.
+    # Parameters that can make the effect vanish set its strength: some are drawn, and grow
+    # together. The limit of an effect that is a limit becomes smaller with the strength.
     sizes = [p for p in effect.parameters if math.isfinite(p.off) and p.off < p.high]
     limits = [] if sizes else [p for p in effect.parameters if p.off == p.high]
     chosen = [p for p in sizes if generator.random() < 0.5] or sizes[:1]

@@ -1,4 +1,4 @@
-"""What is concealed in a case, what is said of it, and when that is right."""
+"""What is injected in a case, what its explanation reports, and when the report is right."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,37 +13,36 @@ from endoscope_explain.recording import Recording
 
 @dataclass(frozen=True)
 class Law:
-    """A concealed law, and what may be said of it."""
+    """An injected law, and the names that count as right for it."""
 
     name: str  # effect, or place of the law
     joint: str  # on which it acts; empty where it acts on all
     stage: str  # of the chain
-    ids: frozenset[str]  # effects that are a right name
+    ids: frozenset[str]  # effects that are right names
     places: frozenset[str]  # places that are right
-    is_unknown: bool = False  # the right name is that it is unknown, wherever it is said to be
+    is_unknown: bool = False  # "unknown physics" is the right answer, at whatever place
 
 
 @dataclass(frozen=True)
 class Case:
-    """A rig as it was described and as it is, and its recordings."""
+    """A rig as described and as it is, with its recordings."""
 
     stratum: str
     seed: int
-    # The rig as its engineer describes it, as it is without the laws, and with them.
+    # The rig as its engineer describes it, the true rig without the laws, and with them.
     described: PlantDescription
     bare: PlantDescription
     true: PlantDescription
-    laws: tuple[Law, ...]  # concealed; empty where nothing is
+    laws: tuple[Law, ...]  # injected; empty for a null case
     recording: Recording  # to explain
-    second: Recording  # of another motion, to judge on
-    baseline: Recording | None = None  # the rig before anything was concealed
+    second: Recording  # of another motion, for validation
+    baseline: Recording | None = None  # the rig before anything was injected
     left_out: tuple[str, ...] = ()  # effects whose formulas are not tried
-    # Effects and places that are no false names: the form of the rig itself.
+    # Effects and places that do not count as false names: the form of the rig itself.
     also: frozenset[str] = frozenset()
-    # What the laws change, over the signal, each alone, of the channel that shows it most: the
-    # least of them.
+    # Change by a law over the signal, in the channel that shows it most; the least of the laws.
     moved: float = 0.0
-    note: str = ''  # what else is particular
+    note: str = ''  # particulars of the case
 
 
 def law_of_effect(effect_id: str, joint: str) -> Law:
@@ -72,16 +71,16 @@ def effects_at(place_id: str) -> frozenset[str]:
 
 @dataclass(frozen=True)
 class Statement:
-    """One thing that is said to be missing."""
+    """One thing that an explanation reports as missing."""
 
     name: str  # effect, or place of an unknown term
     joint: str
     stage: str
-    rivals: tuple[str, ...] = ()  # names that may stand for it as well
+    alternatives: tuple[str, ...] = ()  # names that explain the recording as well
 
     @property
     def places(self) -> frozenset[str]:
-        """Places that it points at."""
+        """Places that the name stands for."""
         if self.name in FUNCTIONS:
             return frozenset({self.name})
         return frozenset(CATALOGUE[self.name].traits.families)
@@ -89,45 +88,45 @@ class Statement:
 
 @dataclass(frozen=True)
 class Judgement:
-    """How far what is said is right."""
+    """How far the reported statements are right."""
 
-    # As many statements as there are laws, the first ones, name all of them; where nothing is
-    # concealed, nothing is said.
+    # The first statements, as many as there are laws, name all laws; of a null case nothing is
+    # reported.
     first: bool
-    place: bool  # they point at the right places
-    stage: bool  # and at the right parts of the chain
-    exact: bool  # all is named first, and nothing else is said
-    false: int  # names that are of no law
-    in_set: bool  # each law is among the first statements or their rivals
-    set_size: float  # names of a statement with its rivals, mean of the first ones
+    place: bool  # they name the right places
+    stage: bool  # they name the right stages of the chain
+    exact: bool  # all laws are named first, and nothing else is reported
+    false: int  # names that belong to no law
+    in_set: bool  # each law is among the first statements or their alternatives
+    set_size: float  # names of a statement with its alternatives, mean of the first ones
 
 
-def statements(said: Explanation) -> tuple[Statement, ...]:
-    """What an explanation says is missing, in its order; each name once."""
-    found = [Statement(e.id, e.joint, e.stage, e.alternatives) for e in said.effects]
-    # The unknown term is the headline where the verdict says so, else it comes last; the function
-    # by which a named effect is modelled says no more than the name.
-    term = said.unknown
+def statements(explanation: Explanation) -> tuple[Statement, ...]:
+    """What an explanation reports as missing, in its order; each name once."""
+    found = [Statement(e.id, e.joint, e.stage, e.alternatives) for e in explanation.effects]
+    # The unknown term is the headline under the verdict UNKNOWN_PHYSICS, otherwise it comes last.
+    # The function by which a named effect is modelled adds nothing to the name.
+    term = explanation.unknown
     if term is not None and not any(
-        e.joint == term.joint and e.id in term.siblings for e in said.effects
+        e.joint == term.joint and e.id in term.siblings for e in explanation.effects
     ):
         unknown = Statement(term.place, term.joint, str(term.there.stage), term.rivals)
-        place = 0 if said.verdict is Verdict.UNKNOWN_PHYSICS else len(found)
+        place = 0 if explanation.verdict is Verdict.UNKNOWN_PHYSICS else len(found)
         found.insert(place, unknown)
     return tuple({(each.name, each.joint): each for each in found}.values())
 
 
 def judged(
-    laws: Sequence[Law], said: Sequence[Statement], also: frozenset[str] = frozenset()
+    laws: Sequence[Law], reported: Sequence[Statement], also: frozenset[str] = frozenset()
 ) -> Judgement:
-    """Compare what is concealed with what is said, the most certain first; `also` is not judged."""
-    named = [s for s in said if any(_names(s, law) for law in laws)]
-    wrong = [s for s in said if s not in named and s.name not in also and not s.places & also]
+    """Compare injected laws with statements, the most certain first; `also` is not judged."""
+    named = [s for s in reported if any(_names(s, law) for law in laws)]
+    wrong = [s for s in reported if s not in named and s.name not in also and not s.places & also]
     false = len({s.name for s in wrong})
     if not laws:
         none = not false
         return Judgement(none, none, none, none, false, none, 1.0)
-    kept = _once([s for s in said if s in named or s in wrong], laws)
+    kept = _once([s for s in reported if s in named or s in wrong], laws)
     leading = kept[: len(laws)]
     first = _all(leading, laws, _names)
     return Judgement(
@@ -137,48 +136,48 @@ def judged(
         first and len(kept) == len(laws),
         false,
         _all(leading, laws, _may_name),
-        sum(1 + len(s.rivals) for s in leading) / max(len(leading), 1),
+        sum(1 + len(s.alternatives) for s in leading) / max(len(leading), 1),
     )
 
 
 def is_of(name: str, joint: str, law: Law) -> bool:
-    """Whether an effect or place on a joint is what a law is called."""
+    """Whether an effect or place on a joint is a right name of a law."""
     return _names(Statement(name, joint, ''), law)
 
 
-def _names(said: Statement, law: Law) -> bool:
-    if law.joint not in ('', said.joint):
+def _names(statement: Statement, law: Law) -> bool:
+    if law.joint not in ('', statement.joint):
         return False
     if law.is_unknown:
-        return said.name in FUNCTIONS
-    return said.name in law.ids or said.name in law.places
+        return statement.name in FUNCTIONS
+    return statement.name in law.ids or statement.name in law.places
 
 
-def _is_at(said: Statement, law: Law) -> bool:
-    if law.joint not in ('', said.joint):
+def _is_at(statement: Statement, law: Law) -> bool:
+    if law.joint not in ('', statement.joint):
         return False
-    return said.name in law.ids or bool(said.places & law.places)
+    return statement.name in law.ids or bool(statement.places & law.places)
 
 
-def _may_name(said: Statement, law: Law) -> bool:
-    names = (said.name, *said.rivals)
-    return any(_names(Statement(name, said.joint, said.stage), law) for name in names)
+def _may_name(statement: Statement, law: Law) -> bool:
+    names = (statement.name, *statement.alternatives)
+    return any(_names(Statement(name, statement.joint, statement.stage), law) for name in names)
 
 
-def _once(said: Sequence[Statement], laws: Sequence[Law]) -> list[Statement]:
-    """What is said, a device's fault once although it shows on every joint."""
+def _once(reported: Sequence[Statement], laws: Sequence[Law]) -> list[Statement]:
+    """The statements, with a device's fault once although it shows on every joint."""
     of_device = {name for law in laws if not law.joint for name in law.ids}
     kept: dict[tuple[str, str], Statement] = {}
-    for each in said:
+    for each in reported:
         kept.setdefault((each.name, '' if each.name in of_device else each.joint), each)
     return list(kept.values())
 
 
 def _all(
-    said: Sequence[Statement], laws: Sequence[Law], agrees: Callable[[Statement, Law], bool]
+    leading: Sequence[Statement], laws: Sequence[Law], agrees: Callable[[Statement, Law], bool]
 ) -> bool:
     """Whether each statement agrees with a law of its own."""
-    return len(said) == len(laws) and any(
+    return len(leading) == len(laws) and any(
         all(agrees(s, law) for s, law in zip(order, laws, strict=True))
-        for order in permutations(said)
+        for order in permutations(leading)
     )

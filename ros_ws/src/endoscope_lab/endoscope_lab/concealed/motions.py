@@ -1,4 +1,4 @@
-"""Motions of the recordings: one made for identification, another to judge on, a surgeon's hand."""
+"""Motions of the recordings: for identification, for validation, and of a surgeon's hand."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from endoscope_core.signals.motions import (
 Array = NDArray[np.float64]
 
 RATE = 1000.0
-"""Commands in 1/s, as the graph records them."""
+"""Rate of commands in 1/s, as the graph records them."""
 REACH = (0.8, 1.25)
 """Range in rad of the largest desired angle."""
 HAND_S = 30.0
@@ -35,8 +35,8 @@ def commissioning(generator: np.random.Generator, joints: int) -> Array:
             chirp(generator.uniform(0.6, 0.9) * a, 6.0, 0.3, generator.uniform(3.0, 5.0)),
             _hand(generator, 6.0, a),
         ]
-        # They come in an order of their own for each joint; joints after the first begin later, so
-        # that what appears on them meanwhile is coupling.
+        # Each joint has its own order; joints after the first start later, so that what they show
+        # before is coupling.
         order = [parts[i] for i in generator.permutation(len(parts))]
         if k:
             order[0] = hold(order[0].duration)
@@ -45,7 +45,7 @@ def commissioning(generator: np.random.Generator, joints: int) -> Array:
 
 
 def another(generator: np.random.Generator, joints: int) -> Array:
-    """Multisine, free moves and a quicker triangle, to judge on: about 18 s, as `commissioning`."""
+    """Multisine, free moves and a faster triangle, to judge on: about 18 s, as `commissioning`."""
     signals = []
     for _ in range(joints):
         a = 0.9 * generator.uniform(*REACH)
@@ -60,13 +60,13 @@ def another(generator: np.random.Generator, joints: int) -> Array:
 
 
 def sinusoid(generator: np.random.Generator, joints: int) -> Array:
-    """The calibration of 9 s, as `commissioning`."""
+    """The calibration motion of 9 s, as `commissioning`."""
     del generator
     return _shaft([calibration_sinusoid()] * joints)
 
 
 def teleoperation(generator: np.random.Generator, joints: int) -> Array:
-    """Reaches of minimum jerk with pauses, as a surgeon makes them, as `commissioning`."""
+    """Minimum-jerk reaches with pauses, like a surgeon's, as `commissioning`."""
     return _shaft([_hand(generator, HAND_S, generator.uniform(*REACH)) for _ in range(joints)])
 
 
@@ -76,7 +76,7 @@ def _hand(generator: np.random.Generator, duration: float, reach: float) -> Sign
 
 
 def _sinusoid(amplitude: float, frequency: float, duration: float) -> Signal:
-    """A multisine of one line."""
+    """A multisine with one spectral line."""
     return multisine(amplitude, duration, frequency, 1)
 
 

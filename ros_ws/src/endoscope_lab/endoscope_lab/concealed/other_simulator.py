@@ -1,4 +1,4 @@
-"""Rigs of the simulator that shares no code with the kernel, with a law of its own form or none."""
+"""Rigs of the simulator that shares no code with the kernel, with a law of another form or none."""
 
 from collections.abc import Callable
 from dataclasses import asdict
@@ -20,13 +20,13 @@ Array = NDArray[np.float64]
 Generator = np.random.Generator
 
 NOTHING = 1.0 / 6.0
-"""Share of the rigs in which nothing is concealed."""
+"""Share of the rigs without an injected law."""
 
 
 def of_other_simulator(
     generator: Generator, effect: str | None, aims: tuple[float, float] = AIM
 ) -> tuple[Case, dict]:
-    """A rig of sliding nodes; an effect that is given moves a share of the signal between two."""
+    """A rig of sliding nodes, with a given or drawn effect that moves a share of the signal."""
     described = described_rig(generator, 1)
     true = true_rig(generator, described)
     (name, joint), sensors = *true.joints.items(), true.sensors
@@ -56,7 +56,7 @@ def _as_strong(
     command: Array,
     aims: tuple[float, float],
 ) -> tuple[Laws, float]:
-    """A law that moves a drawn share of the signal, drawn again where it cannot."""
+    """A law that moves a drawn share of the signal, drawn again if it cannot."""
     bare = read(joint, Laws(), command, FEW_NODES)
     reached, duration = float(np.abs(bare.bending).max()), float(bare.time[-1])
 

@@ -1,4 +1,4 @@
-"""Recordings in memory: what the sensors of a simulated rig read, and how far a plant is off."""
+"""Recordings in memory: sensor readings of a simulated rig, and the misfit of a plant."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -20,19 +20,19 @@ from endoscope_explain.recording import BENDING, COMMAND, MOTOR, WIRES, Recordin
 Array = NDArray[np.float64]
 
 TRACKER_TICKS = 25
-"""Ticks from one sample of the tracker to the next: 40 Hz."""
+"""Ticks between samples of the tracker: 40 Hz."""
 MEAN_OVER = 10
-"""Readings of wires and motor that are judged as one, their mean: 10 ms, as in a report."""
+"""Readings of wires and motor that are averaged before they are judged: 10 ms, as in a report."""
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Forms of noise of load cells and tracker that the description of sensors does not have."""
+    """Noise of load cells and tracker beyond the description of sensors."""
 
-    # Rms of a slow part (Ornstein-Uhlenbeck), in their white noise.
+    # Rms of a slow part (Ornstein-Uhlenbeck), relative to the white noise.
     slow: float = 0.0
     slow_s: float = 2.0  # its correlation time
-    # Degrees of freedom of the Student's t that they draw from, of the same rms; normal if
+    # Degrees of freedom of the noise's Student's t distribution, of the same rms; normal if
     # infinite.
     freedom: float = math.inf
 
@@ -51,7 +51,7 @@ class Readings:
     bending: Array  # (M, J)
 
     def signals(self) -> dict[str, Array]:
-        """What sensors read, by the names of a recording's series."""
+        """Readings by the names of a recording's series."""
         names = ('shaft_position', 'shaft_velocity', 'shaft_effort', 'tension', 'bending')
         return {name: getattr(self, name) for name in names}
 
@@ -71,10 +71,10 @@ class Readings:
 
 
 def read(plant: PlantDescription, command: Array) -> Readings:
-    """Read a rig without noise under a motor shaft command (N, J) in rad, every ms."""
+    """Readings of a rig without noise, for motor shaft commands (N, J) in rad, every ms."""
     answer = simulate(plant, command)
     stamps = answer.time[::TRACKER_TICKS]
-    # A clock that runs fast stamps what was read before.
+    # A clock that runs fast stamps earlier readings.
     seen = recording_faults(plant).tracker_time(stamps)
     bending = np.column_stack([np.interp(seen, answer.time, q) for q in answer.bending.T])
     return Readings(
@@ -92,7 +92,7 @@ def read(plant: PlantDescription, command: Array) -> Readings:
 def record(
     plant: PlantDescription, command: Array, seed: int, noise: Noise | None = None
 ) -> Recording:
-    """What a rig's sensors read with their noise, as `read`."""
+    """Readings of a rig with the noise of its sensors, as `read`."""
     return as_sensed(read(plant, command), plant.joint_names(), plant.sensors, seed, noise)
 
 
@@ -103,7 +103,7 @@ def as_sensed(
     seed: int,
     noise: Noise | None = None,
 ) -> Recording:
-    """Readings with the noise and the steps of the sensors that are described."""
+    """Readings with the noise and the resolution of described sensors."""
     noise, own = noise or Noise(), described
     if math.isfinite(noise.freedom):
         own = replace(own, load_cell_noise=0.0, tracker_noise=0.0, load_cell_resolution=0.0)
@@ -132,15 +132,15 @@ def as_sensed(
 
 
 def misfit(plant: PlantDescription, recording: Recording, sensors: SensorParameters) -> float:
-    """Rmse of a plant's prediction over the noise of the sensors, of the signal that is worst."""
+    """Rmse of a plant's prediction over the noise of the sensors, for the worst signal."""
     predicted = in_noise(read(plant, recording.command.values).signals(), sensors)
     measured = in_noise({k: s.values for k, s in recording.measured().items()}, sensors)
     return worst_rms(np.subtract(*pair) for pair in zip(measured, predicted, strict=True))
 
 
 def in_noise(signals: Mapping[str, Array], sensors: SensorParameters) -> list[Array]:
-    """`Readings.signals` over the sensors' noise, by column, as means that are judged as one."""
-    # Shaft velocity is left out.
+    """`Readings.signals` over the sensors' noise, by column, averaged as they are judged."""
+    # Without shaft velocity.
     kinds = (
         ('shaft_position', 0.0, 2.0 * math.pi / sensors.encoder_counts),
         ('shaft_effort', sensors.effort_noise, sensors.effort_resolution),
@@ -153,14 +153,14 @@ def in_noise(signals: Mapping[str, Array], sensors: SensorParameters) -> list[Ar
         values = signals[name].reshape(len(signals[name]), -1)
         values = values[: len(values) // over * over]
         means = values.reshape(-1, over, values.shape[1]).mean(axis=1)
-        # Rounding of a quiet signal is the same in all readings of a mean.
+        # Without white noise, rounding errors are the same in all readings of a mean.
         noise = math.sqrt(white**2 / over + step**2 / 12.0 / (over if white else 1))
         columns += list(means.T / noise)
     return columns
 
 
 def worst_rms(columns: Iterable[Array]) -> float:
-    """Rms of the column that has the largest."""
+    """Largest rms of the columns."""
     return max(float(np.sqrt(np.mean(column**2))) for column in columns)
 
 

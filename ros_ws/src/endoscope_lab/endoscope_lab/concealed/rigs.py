@@ -1,4 +1,4 @@
-"""Rigs as described, and as they are: other numbers, another sheath, other sensors."""
+"""Rigs as described, and true rigs: other parameters, another sheath, other sensors."""
 
 import math
 from dataclasses import replace
@@ -16,16 +16,16 @@ Array = NDArray[np.float64]
 
 JOINTS = ('bend_x', 'bend_y')
 MOST_BENT = math.radians(240.0)
-"""Of the tubes that were recorded."""
+"""Largest bend of the recorded tubes."""
 OFF = 0.1
-"""Half-width of the relative difference of a rig's numbers from its description."""
+"""Half-width of the relative difference of a rig's parameters from its description."""
 DRILLED = 0.01
-"""The same of radii where they are off as well."""
+"""The same for radii, where they differ as well."""
 UNEVENNESS = 0.3
-"""Rms of the first coefficient that a rig's friction profile differs by; the next are smaller."""
+"""Rms difference of the first coefficient of a rig's friction profile; the next are smaller."""
 TIGHTENING, REST_ANGLE, SPREAD = 0.15, 0.03, 0.25
-"""Half-widths of the difference of the pretension's profile, of the angles in rad at which a joint
-rests and its section is straight, and of the spread of its pre-sliding."""
+"""Half-widths of differences: of the pretension's profile, of the rest angle of a joint and the
+straight angle of its section in rad, and of the spread of its pre-sliding."""
 
 
 def described_rig(generator: np.random.Generator, joints: int) -> PlantDescription:
@@ -37,7 +37,7 @@ def described_rig(generator: np.random.Generator, joints: int) -> PlantDescripti
 def true_rig(
     generator: np.random.Generator, described: PlantDescription, drilled: bool = False
 ) -> PlantDescription:
-    """A healthy rig, its numbers within 10 % of the described ones; its radii, too, if drilled."""
+    """A healthy rig with parameters within 10 % of those described; radii within 1 % if drilled."""
     joints = {}
     for name, joint in described.joints.items():
         keys = (*SCALED_NOMINAL, 'pulley_radius', 'joint_radius') if drilled else SCALED_NOMINAL
@@ -61,7 +61,7 @@ def true_rig(
 
 
 def other_sheath(generator: np.random.Generator, rig: PlantDescription) -> PlantDescription:
-    """The rig with a tight bend somewhere, waves of friction, and a wide spread of pre-sliding."""
+    """The rig with a tight bend, waves of friction, and a wide spread of pre-sliding."""
     joints = {}
     for name, joint in rig.joints.items():
         place, width = generator.uniform(0.2, 0.8), generator.uniform(0.08, 0.2)
@@ -79,7 +79,7 @@ def other_sheath(generator: np.random.Generator, rig: PlantDescription) -> Plant
 
 
 def coarse_sensors(generator: np.random.Generator) -> SensorParameters:
-    """Sensors that read in larger steps than described."""
+    """Sensors with a coarser resolution than described."""
     return replace(
         SensorParameters(),
         load_cell_resolution=generator.uniform(0.02, 0.06),
@@ -89,7 +89,7 @@ def coarse_sensors(generator: np.random.Generator) -> SensorParameters:
 
 
 def spreads(joint: JointParameters) -> dict[str, float]:
-    """Rms by which each number of a rig differs from its description; `friction_profile_1`..."""
+    """Rms difference of each parameter of a rig from its description; `friction_profile_1`..."""
     uniform = 1.0 / math.sqrt(3.0)
     return {
         **{key: OFF * uniform * getattr(joint, key) for key in SCALED_NOMINAL},
@@ -102,7 +102,7 @@ def spreads(joint: JointParameters) -> dict[str, float]:
 
 
 def with_number(joint: JointParameters, key: str, added: float) -> JointParameters:
-    """The joint with something added to one of the numbers that `spreads` names."""
+    """The joint with an offset of one of the parameters that `spreads` names."""
     if key.startswith('friction_profile_'):
         term = np.zeros(int(key[-1]))
         term[-1] = added

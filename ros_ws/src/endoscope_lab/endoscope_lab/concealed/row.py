@@ -1,4 +1,4 @@
-"""A case of the benchmark as a row: what was concealed, what was said, how far it is right."""
+"""A case of the benchmark as a row: injected laws, reported names, and how far these are right."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -17,7 +17,7 @@ from endoscope_lab.concealed.sets import JudgedContest, all_hold, mean_size
 GOOD = 1.3
 """Rmse over noise up to which a second recording is predicted."""
 COLUMNS = (
-    *('stratum', 'cases', 'told apart', 'named first of these', 'of all', 'right place'),
+    *('stratum', 'cases', 'identifiable', 'of these named first', 'of all', 'right place'),
     *('exact set', 'false names', 'in set', 'names a set', 'intervals', 'described', 'refitted'),
     *('improved', '80th', 's, median', '95th'),
 )
@@ -25,39 +25,39 @@ COLUMNS = (
 
 @dataclass(frozen=True, kw_only=True)
 class Row(Judgement):
-    """What was concealed, what was said, and how far it is right."""
+    """Injected laws, reported names, and how far these are right."""
 
     stratum: str
     seed: int
     concealed: tuple[str, ...]  # laws with their joints
-    note: str  # what is particular to the case
-    moved: float  # what the laws change, over the signal
+    note: str  # particulars of the case
+    moved: float  # change by the laws, over the signal
     left: float  # what a refit of the rig's numbers leaves of them, over noise
     verdict: str
-    said: tuple[str, ...]  # names with their joints, most certain first
-    # Intervals that hold the true number, of how many: those of the plant, and of the numbers of
-    # named effects that could be measured another way.
+    reported: tuple[str, ...]  # names with their joints, most certain first
+    # Intervals that contain the true number, and their count: those of the plant, and of the
+    # numbers of named effects that could be measured another way.
     held: int = 0
     intervals: int = 0
-    # Misfit of the second recording over noise, of the worst signal.
+    # Misfit of the second recording over noise, for the worst signal.
     nominal: float = math.nan
     refitted: float = math.nan
     augmented: float = math.nan
     seconds: float = math.nan  # that explaining took
-    # What is left over what rigs of another form leave, of the worst joint.
+    # Residual over that of rigs of another form, for the worst joint.
     beyond_form: float = math.nan
     # Error of each number over what its interval would allow on that side with an `INTERVAL_WIDTH`
     # of one.
     errors: tuple[float, ...] = ()
     contests: tuple[dict[str, Any], ...] = ()  # as in `sets.JudgedContest`
-    # The laws that are told from other numbers, and whether the first statements name these.
-    told: tuple[str, ...] = ()
-    first_of_told: bool = True
+    # Laws that no change of the rig's numbers imitates, and whether the first statements name them.
+    identifiable: tuple[str, ...] = ()
+    first_of_identifiable: bool = True
 
     @property
-    def is_told_apart(self) -> bool:
-        """Whether laws, if any, are told from other numbers and a second recording misses them."""
-        return not self.concealed or (bool(self.told) and not self.refitted <= GOOD)
+    def is_identifiable(self) -> bool:
+        """Whether a null case, or laws that refitted numbers do not imitate in either recording."""
+        return not self.concealed or (bool(self.identifiable) and not self.refitted <= GOOD)
 
     def line(self) -> str:
         right = 'right' if self.exact else 'first' if self.first else 'place' if self.place else ''
@@ -67,7 +67,7 @@ class Row(Judgement):
             f'{self.stratum:17s}{self.seed:4d}  {right or "WRONG":6s}{self.seconds:6.1f} s  '
             f'{" + ".join(self.concealed) or "nothing"}{note}, moves {100.0 * self.moved:.0f} %, '
             f'a refit leaves {self.left:.2g}: '
-            f'{self.verdict}, {" + ".join(self.said) or "nothing"}; second {ratios}'
+            f'{self.verdict}, {" + ".join(self.reported) or "nothing"}; second {ratios}'
         )
 
 
@@ -86,19 +86,19 @@ def _cells(rows: Sequence[Row]) -> tuple[str, ...]:
 
     def second(name: str, quantile: float = 0.5) -> str:
         values = np.array([getattr(row, name) for row in rows])
-        # What failed predicts nothing.
+        # A failed explanation predicts nothing.
         values[np.isnan(values)] = np.inf
         return f'{np.quantile(values, quantile):.3g}'
 
-    apart = [row for row in rows if row.is_told_apart]
+    identifiable = [row for row in rows if row.is_identifiable]
     intervals = sum(row.intervals for row in rows)
     held = f'{100.0 * sum(row.held for row in rows) / intervals:.0f} %' if intervals else '-'
     seconds = [row.seconds for row in rows if not np.isnan(row.seconds)] or [math.nan]
     sizes = [row.set_size for row in rows if not np.isnan(row.set_size)] or [math.nan]
     return (
         str(len(rows)),
-        str(len(apart)),
-        share('first_of_told', apart),
+        str(len(identifiable)),
+        share('first_of_identifiable', identifiable),
         share('first'),
         share('place'),
         share('exact'),
@@ -119,14 +119,14 @@ CaseKey = tuple[str, int]
 """Stratum and seed."""
 
 SAME = 0.02
-"""Relative difference of a misfit that two machines may have: fits end within a thousandth of their
-cost, in which a misfit of twice the noise has a share of a hundredth."""
+"""Relative difference of a misfit between two machines: fits end within a thousandth of their cost,
+of which a misfit of twice the noise is a hundredth."""
 
 
 def rows_of(file: Path) -> dict[CaseKey, Row]:
-    """Read a record, its sets and intervals by the criteria in force.
+    """Read a record, with sets and intervals by the present criteria.
 
-    EndoscopeError for a line that is none of a row.
+    EndoscopeError for a line that is not a row.
     """
     return {(row.stratum, row.seed): _by_criteria(row) for row in kept_rows(file, Row)}
 
@@ -140,8 +140,8 @@ def _by_criteria(row: Row) -> Row:
 
 
 def differences(before: Row, now: Row) -> Iterator[str]:
-    """In what an explanation differs from the one on record: verdict, names, misfits, numbers."""
-    for name in ('verdict', 'said'):
+    """How an explanation differs from the one on record: verdict, names, misfits, intervals."""
+    for name in ('verdict', 'reported'):
         was, is_ = getattr(before, name), getattr(now, name)
         if was != is_:
             yield f'{name} {_shown(was)} -> {_shown(is_)}'

@@ -1,23 +1,24 @@
-"""A joint pulled by wires in sheaths with friction all along, as slowly and plainly as it can be.
+"""Reference model of a joint pulled by wires in sheaths with distributed friction, slow and simple.
 
 A wire is a row of springs joined at nodes. Each node rubs on the sheath with its share of the
 capstan's exponent (Euler 1769, Eytelwein 1808), so the tensions on its two sides hold it as long as
 
     |ln T_i - ln T_(i+1)| <= dphi_i,
 
-and where they do not, it slips just far enough that they do. Beginning with a guess of which ones
-slip, one node after the other is put right, and all again until none moves. Nothing here knows of
-fronts that run into the wire: they come out.
+and where they do not, it slips just far enough that they do. Starting from a guess of the nodes
+that slip, one node after the other is corrected, and all again until none moves. Fronts that travel
+along the wire are a result, not an assumption.
 
 A wire of `cells` nodes has its tensions at s = i / cells, i = 0 .. cells; the springs at its two
 ends are half as long as the others, so the sums over the wire are trapezoidal rules and its two end
 tensions are those of the first and the last spring, with the whole exponent between them.
 
 The bending section is a row of hinges, bent alike. With section friction the wire on the inside of
-the bend rubs on a guide at each of them (capstan; Kaneko et al., IEEE ICRA 1991), and a hinge feels
-what arrives there. `section_friction` is that of the whole section as its moment shows it, mu in
-r T (1 - mu |q - qs|) to first order, r T the moment without: each of the three hinges rubs with
-1.5 mu per rad of its own bend, by which the wire loses exp(-1.5 mu |q - qs|) up to the last.
+the bend rubs on a guide at each of them (capstan; Kaneko et al., IEEE ICRA 1991), and the tension
+that arrives acts on the hinge. `section_friction` is that of the whole section by its moment, mu in
+r T (1 - mu |q - qs|) to first order, with r T the moment without friction: each of the three hinges
+rubs with 1.5 mu per rad of its own bend, so that the tension falls by exp(-1.5 mu |q - qs|) up to
+the last.
 """
 
 import math
@@ -59,7 +60,7 @@ BALANCED = 1e-12  # N m
 
 @dataclass(frozen=True)
 class Acting:
-    """What acts on wires and joint beside what `NOMINAL` has."""
+    """Laws that act on wires and joint beyond `NOMINAL`."""
 
     rubbing: Array  # (N,), factor on the exponent of all nodes before each row
     moment: Array  # (N,), on the joint from outside before each row, N m
@@ -98,7 +99,7 @@ def motor_angle(plant: Plant, shaft_command: ArrayLike, tick: float) -> Array:
 def follow(
     plant: Plant, shaft: ArrayLike, tick: float, cells: int, acting: Acting | None = None
 ) -> tuple[Array, Array, Array]:
-    """`at_motor, at_joint, angle` as `simulate` gives them, for a shaft whose angle is known."""
+    """`at_motor, at_joint, angle` as from `simulate`, for a known angle of the shaft."""
     spread = float(plant['joint_presliding_spread'])
     elements = np.exp(spread * np.array([-1.0, 0.0, 1.0])) if spread else np.ones(1)
     grip, springs, tension = wire_of(plant, cells)
@@ -158,7 +159,7 @@ def _imbalance(
     extension: Array,
     deflection: Array,
 ) -> float:
-    """Torque in N m that a joint step in rad would leave over; it rises with the step."""
+    """Unbalanced torque in N m after a joint step in rad; it rises with the step."""
     pulley, radius, stiffness, rest, friction, damping, rubs, straight = p
     left_over = damping * step / tick + stiffness * (angle + step - rest)
     left_over += load[0] * math.sin(angle + step + load[1]) - moment
@@ -169,8 +170,7 @@ def _imbalance(
         left_over += friction * _rubbed(deflection[i], step, presliding[i]) / len(presliding)
     bend = angle + step - straight
     inner = 0 if bend >= 0.0 else 1
-    # Both wires are moved by the motor's turn in rad and by the step; not a number if a wire's
-    # nodes do not settle.
+    # The motor's turn in rad and the step move both wires; NaN if a wire's nodes do not settle.
     for wire in range(2):
         sign = 1.0 - 2.0 * wire
         if not pull(
@@ -193,9 +193,9 @@ def _imbalance(
 
 @compiled
 def _left_at_hinges(bent: float, step: float, presliding: Array, deflection: Array) -> float:
-    """Mean over the hinges of the share that arrives there of the inner wire's tension.
+    """Mean over the hinges of the share of the inner wire's tension that arrives there.
 
-    `bent` is mu (q - qs), of the sign of the bend, after a joint step in rad.
+    `bent` is mu (q - qs), with the sign of the bend, after a joint step in rad.
     """
     # Hinges in a row add their angles, each against n times the stiffness of them all. Hinge i
     # balances for itself what arrives there, r T_i against n K q_i, and the mean of all n balances
@@ -228,7 +228,7 @@ def _left_at_hinges(bent: float, step: float, presliding: Array, deflection: Arr
 
 @compiled
 def _rubbed(deflection: float, step: float, presliding: float) -> float:
-    """Dahl's friction (Dahl 1968), as a part of its limit, after a step of one sign."""
+    """Dahl's friction (Dahl 1968) over its limit, after a step of one sign."""
     limit = math.copysign(1.0, step)
     return limit + (deflection - limit) * math.exp(-abs(step) / presliding)
 

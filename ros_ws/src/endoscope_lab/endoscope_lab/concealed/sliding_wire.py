@@ -1,4 +1,4 @@
-"""A wire in its sheath: a row of springs, joined at nodes that rub (`sliding_nodes` says how)."""
+"""A wire in its sheath: a row of springs, joined at nodes that rub (see `sliding_nodes`)."""
 
 import math
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ Plant = Mapping[str, Any]
 """Numbers, and the harmonics of the friction profile, by the keys of `sliding_nodes.NOMINAL`."""
 
 MOST_SWEEPS, MOST_GUESSES = 200_000, 30
-BEGUN = 1e-30  # m, of a node that is about to slip
+BEGUN = 1e-30  # m, slip of a node that starts to slip
 SETTLED = 1e-11  # N
 
 
@@ -49,25 +49,25 @@ def wire_of(plant: Plant, cells: int) -> tuple[Array, Array, Array]:
 
 
 @compiled
-def _guess(before: Array, slip: Array, grip: Array, springs: Array, room: Array) -> None:
-    """Guess the slip of all nodes: those slip that did, the others hold, and who errs changes."""
-    # Once it is known which nodes slip, and to which end, their slips follow from linear equations
-    # between neighbours, by elimination (Thomas 1949). The sweeps judge the guess, and mend it.
+def _guess(before: Array, slip: Array, grip: Array, springs: Array, scratch: Array) -> None:
+    """Guess the slip of all nodes: start from those that slipped, and correct wrong ones."""
+    # For a known set of slipping nodes and directions, the slips follow from linear equations
+    # between neighbours, by elimination (Thomas 1949). The sweeps check and correct the guess.
     nodes = len(grip)
     for _ in range(MOST_GUESSES):
-        room[0] = 0.0
+        scratch[0] = 0.0
         for j in range(1, nodes + 1):
             low, middle, high, right = 0.0, 1.0, 0.0, 0.0
             if slip[j] != 0.0:
-                # The spring that pulls has so many times the tension of the other.
+                # Ratio of the tensions on either side of the node.
                 ratio = grip[j - 1] if slip[j] > 0.0 else 1.0 / grip[j - 1]
                 low, high = -springs[j - 1], -ratio * springs[j]
                 middle, right = -low - high, before[j - 1] - ratio * before[j]
-            pivot = middle - low * room[j - 1]
-            room[j] = high / pivot
+            pivot = middle - low * scratch[j - 1]
+            scratch[j] = high / pivot
             slip[j] = (right - low * slip[j - 1]) / pivot
         for j in range(nodes, 0, -1):
-            slip[j] -= room[j] * slip[j + 1]
+            slip[j] -= scratch[j] * slip[j + 1]
         erred, behind = False, slip[0]
         for j in range(1, nodes + 1):
             here, ratio = slip[j], grip[j - 1]
@@ -84,17 +84,17 @@ def _guess(before: Array, slip: Array, grip: Array, springs: Array, room: Array)
 
 @compiled
 def _relax(before: Array, slip: Array, grip: Array, springs: Array, tension: Array) -> bool:
-    """Find the slip of all nodes of a taut wire, given that of its ends; `tension` is written."""
-    # Every node stays where it was at the start of the tick if the springs beside it allow that;
-    # otherwise it slips to where they just do. Node by node, swept until nothing moves, with
-    # over-relaxation (projected, Cryer 1971: it cannot carry a node across where it stood).
+    """Find the slip of all nodes of a taut wire for given slips of its ends; writes `tension`."""
+    # Every node stays where it was at the start of the tick if the springs next to it allow that;
+    # otherwise it slips just as far as needed. Sweeps over the nodes until none moves, with
+    # over-relaxation (projected, Cryer 1971, so that no node overshoots its start).
     nodes = len(grip)
     _guess(before, slip, grip, springs, tension)
     for i in range(nodes + 1):
         tension[i] = before[i] + springs[i] * (slip[i] - slip[i + 1])
     factor = 2.0 / (1.0 + math.sin(math.pi / nodes))
     for sweep in range(MOST_SWEEPS):
-        # Over-relaxation that circles is given up for the plain, slower method.
+        # If over-relaxation cycles, continue with the plain, slower method.
         over = factor if sweep < MOST_SWEEPS // 10 else 1.0
         most = 0.0
         for j in range(1, nodes + 1):
@@ -129,12 +129,12 @@ def pull(
     springs: Array,
     tension: Array,
 ) -> bool:
-    """Move both ends of a wire by `motor` and `joint` in m; its extension below 0 is slack."""
+    """Move both ends of a wire by `motor` and `joint` in m; a negative extension is slack."""
     after = extension + motor - joint
     if after <= 0.0:
         tension[:] = 0.0
         return True
-    # A slack wire lies still until its length is used up; only what is moved after that stretches.
+    # Only the part of the motion after the slack is taken up stretches the wire.
     taut = 1.0 if extension >= 0.0 else after / (after - extension)
     slip[0], slip[-1] = taut * motor, taut * joint
     return _relax(before, slip, grip, springs, tension)
@@ -149,8 +149,8 @@ def _move_wire(
     for i in range(len(springs)):
         extension += along[0, i] / springs[i]
     for k in range(1, len(motor)):
-        turned, give = motor[k] - motor[k - 1], joint[k] - joint[k - 1]
-        if not pull(extension, turned, give, along[k - 1], slip, grip, springs, along[k]):
+        at_motor, at_joint = motor[k] - motor[k - 1], joint[k] - joint[k - 1]
+        if not pull(extension, at_motor, at_joint, along[k - 1], slip, grip, springs, along[k]):
             return False
-        extension += turned - give
+        extension += at_motor - at_joint
     return True

@@ -38,15 +38,15 @@ Motion = Callable[[Generator, int], Array]
 
 WEAKER = 0.1
 FORM_AIM = (0.02, 0.05)
-"""The same of a form of the sheath that is no concealed law."""
+"""Share of the signal moved by a form of the sheath that is not an injected law."""
 FACTOR = (0.3, 1.0)
-"""By how much (rms) a form varies that another one multiplies."""
+"""Range of the rms variation of a form that multiplies another one."""
 _BEGIN = 0.02
-"""Share of what a place takes at which the search for a law's strength begins."""
+"""Share of the largest value at a place at which the search for a law's strength starts."""
 
-# What both wires carry together does not change while neither is slack.
+# The mean tension of both wires does not change while neither is slack.
 PLACES = tuple(p for p in FUNCTIONS if FUNCTIONS[p].argument is not BOTH_TENSIONS)
-"""Places at which a law shows."""
+"""Places at which a law is observable."""
 _FAMILIES = [p for p in PLACES if effects_at(p)]
 _OUTSIDE = [p for p in PLACES if not effects_at(p)]
 _PAIRS = [
@@ -57,13 +57,13 @@ _PAIRS = [
     and FUNCTIONS[p].argument.symbol != FUNCTIONS[other].argument.symbol
     and {FUNCTIONS[p].argument, FUNCTIONS[other].argument} != {TIME, DISTANCE}
 ]
-"""Places of two states on which the same can depend; time and distance only grow together."""
+"""Places of two states with the same point of action, except time with distance: both only grow."""
 _WITH_FAMILIES = [e for e in DRAWN if set(CATALOGUE[e].traits.families) & set(PLACES)]
 
 
 @dataclass(frozen=True)
 class _Rig:
-    """A rig in the making: described, true, and the motion of its recording."""
+    """A rig under construction: described, true, and the motion of its recording."""
 
     described: PlantDescription
     true: PlantDescription
@@ -81,7 +81,7 @@ def catalogue(
 
 
 def leave_a_form_out(generator: Generator, seed: int) -> Case:
-    """One effect in its own formula, which explain is not given."""
+    """One effect in its own formula, which is withheld from explain."""
     effect = _turn(_WITH_FAMILIES, seed)
     rig = _rig(generator, _joints_of(effect))
     case = _finished(generator, seed, rig, *_with_effect(generator, rig, effect))
@@ -89,14 +89,14 @@ def leave_a_form_out(generator: Generator, seed: int) -> Case:
 
 
 def mixed_forms(generator: Generator, seed: int) -> Case:
-    """A drawn form at a place of some effect's family."""
+    """A drawn form at a place of an effect's family."""
     place = _turn(_FAMILIES, seed)
     rig = _rig(generator, _joints_of(place))
     return _finished(generator, seed, rig, *_with_form(generator, rig, place))
 
 
 def outside(generator: Generator, seed: int) -> Case:
-    """A drawn form at a place of no effect's family; two of them in every fourth case."""
+    """A drawn form at a place outside all effects' families; two forms in every fourth case."""
     place = _turn(_OUTSIDE, seed)
     rig = _rig(generator, _joints_of(place))
     true, law, share = _with_form(generator, rig, place)
@@ -110,7 +110,7 @@ def outside(generator: Generator, seed: int) -> Case:
 
 
 def two_states(generator: Generator, seed: int) -> Case:
-    """A drawn form of one state that a drawn form of another one multiplies."""
+    """A drawn form of one state, multiplied by a drawn form of another state."""
     place, other = _turn(_PAIRS, seed)
     rig = _rig(generator, max(_joints_of(place), _joints_of(other)))
     case = _finished(generator, seed, rig, *_with_form(generator, rig, place, times=other))
@@ -118,7 +118,7 @@ def two_states(generator: Generator, seed: int) -> Case:
 
 
 def another_sheath(generator: Generator, seed: int) -> Case:
-    """Sheath and joint of another form; every second case an effect, two of four a baseline."""
+    """Sheath and joint of another form; every second case has an effect, two of four a baseline."""
     effect = _turn(DRAWN, seed // 2)
     rig = _rig(generator, _joints_of(effect))
     rig = replace(rig, true=other_sheath(generator, rig.true))
@@ -140,7 +140,7 @@ def another_sheath(generator: Generator, seed: int) -> Case:
 
 
 def nulls(generator: Generator, seed: int) -> Case:
-    """Nothing concealed: other numbers, slow noise, coarse sensors, heavy tails, in turn."""
+    """Null cases: other parameters, slow noise, coarse sensors, heavy tails, in turn."""
     kind = ('numbers', 'slow noise', 'coarse sensors', 'heavy tails')[seed % 4]
     rig = _rig(generator, 1, drilled=kind == 'numbers')
     noise = {
@@ -165,13 +165,13 @@ def pairs(generator: Generator, seed: int) -> Case:
 
 
 def other_simulator(_: Generator, seed: int) -> Case:
-    """A rig of `endoscope prove --form other`: sliding nodes, and laws of their own forms."""
+    """A rig of `endoscope prove --form other`: sliding nodes, and laws of other forms."""
     generator = np.random.default_rng([seed, 0])
     return replace(of_other_simulator(generator, None)[0], seed=seed)
 
 
 def as_strong(effect: str, seed: int, aims: tuple[float, float]) -> Case:
-    """One effect that moves a share of the signal between two; RuntimeError if none moves that."""
+    """One effect that moves a share of the signal in a range; RuntimeError if it cannot."""
     # The rig is the same for the same seed.
     generator = np.random.default_rng([_BY_STRENGTH, DRAWN.index(effect), seed])
     rig = _rig(generator, _joints_of(effect))
@@ -193,11 +193,11 @@ STRATA: dict[str, Callable[[Generator, int], Case]] = {
     'other_simulator': other_simulator,
 }
 _BY_STRENGTH = 11
-"""In place of a stratum's number, so that a seed draws what it always drew."""
+"""Replaces a stratum's number in the seed, and must not change."""
 
 
 def drawn_case(stratum: str, seed: int) -> Case:
-    """Draw a case, the same one for the same seed; KeyError if there is no such stratum."""
+    """Draw a case, the same one for the same seed; KeyError for an unknown stratum."""
     generator = np.random.default_rng([list(STRATA).index(stratum), seed])
     return replace(STRATA[stratum](generator, seed), stratum=stratum)
 
@@ -225,7 +225,7 @@ def _with_effect(
 
         return added, 1.0
 
-    true, share = _concealed(generator, rig, drawn, aims)
+    true, share = _injected(generator, rig, drawn, aims)
     return true, law, share
 
 
@@ -252,17 +252,17 @@ def _with_form(
 
         return added, _BEGIN * largest
 
-    true, share = _concealed(generator, rig, drawn, aim)
+    true, share = _injected(generator, rig, drawn, aim)
     return true, law_at_place(place, joint), share
 
 
-def _concealed(
+def _injected(
     generator: Generator,
     rig: _Rig,
     drawn: Callable[[], tuple[Added, float]],
     aims: tuple[float, float],
 ) -> tuple[PlantDescription, float]:
-    """The rig with a law that moves a share of the signal, drawn again where it cannot."""
+    """The rig with a law that moves a share of the signal, drawn again if it cannot."""
 
     def draw() -> tuple[Added, Callable[[float], Readings], float]:
         added, begin = drawn()
@@ -300,13 +300,13 @@ def _finished(
 
 
 def _turn[T](names: Sequence[T], seed: int) -> T:
-    """Each name in its turn, in an order that does not follow the chain."""
+    """Each name in turn, in an order unrelated to the chain."""
     order = np.random.default_rng(len(names)).permutation(len(names))
     return names[int(order[seed % len(names)])]
 
 
 def _joints_of(name: str) -> int:
-    """Joints of a rig on which an effect, or a law at a place, shows."""
+    """Number of joints on which an effect, or a law at a place, is observable."""
     if name in FUNCTIONS:
         return 2 if FUNCTIONS[name].argument is OTHER_ANGLE else 1
     return 2 if name in OF_THE_OTHER else 1

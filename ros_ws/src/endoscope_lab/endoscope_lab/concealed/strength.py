@@ -1,4 +1,4 @@
-"""How strong a law is: by what it moves, and by what a refit of the rig leaves of it."""
+"""Strength of a law: by the change of the signals, and by its residual after a refit of the rig."""
 
 import math
 from collections.abc import Callable
@@ -14,21 +14,21 @@ from endoscope_lab.concealed.rigs import spreads, with_number
 Array = NDArray[np.float64]
 
 AIM = (0.1, 0.6)
-"""Share of the signal that a law moves of the channel that shows it most."""
+"""Range of the share of the signal that a law moves, in the channel that shows it most."""
 CLOSE = 0.05
-"""Relative error of the share that is reached."""
+"""Relative tolerance of that share."""
 _TRIES, _LAWS = 40, 30
 _STEP = 8.0
 NUDGE = 0.1
-"""Of a difference for a slope, in spreads."""
+"""Step of a finite difference, in spreads."""
 
 
 class OutOfReachError(RuntimeError):
-    """A law that does not move what is measured as far as it should."""
+    """A law that cannot move the measured signals by the wanted share."""
 
 
 def moved(bare: Readings, other: Readings) -> float:
-    """Rms of what a law changes over that of the signal about its mean, in the worst channel."""
+    """Rms change by a law over the standard deviation of the signal, in the worst channel."""
     return max(
         float(np.sqrt(np.mean((b - a) ** 2)) / max(np.std(a), 1e-12))
         for a, b in zip(bare.channels(), other.channels(), strict=True)
@@ -38,8 +38,8 @@ def moved(bare: Readings, other: Readings) -> float:
 def scaled_to(
     aim: float, seen: Callable[[float], Readings], start: float = 1.0
 ) -> tuple[float, float]:
-    """The strength at which a law moves what is `seen` at it by `aim`, and the share reached."""
-    # Where a law cannot be as strong, `seen` raises ValueError.
+    """Strength at which a law moves the readings `seen` by a share `aim`, and the share reached."""
+    # `seen` raises ValueError for a strength that the law cannot have.
     bare = seen(0.0)
     strength, below, above = start, 0.0, math.inf
     for _ in range(_TRIES):
@@ -62,7 +62,7 @@ def scaled_to(
         if math.isfinite(above) and above - below < 1e-6 * above:
             break
         strength = guess
-    raise OutOfReachError(f'no strength moves what is measured by {100.0 * aim:.0f} %')
+    raise OutOfReachError(f'no strength moves a measured signal by {100.0 * aim:.0f} %')
 
 
 def drawn_as_strong[L](
@@ -70,9 +70,9 @@ def drawn_as_strong[L](
     aims: tuple[float, float],
     draw: Callable[[], tuple[L, Callable[[float], Readings], float]],
 ) -> tuple[L, float, float]:
-    """Draw a law, its strength and the share it moves, between two aims by its logarithm."""
-    # `draw` gives a law, what is read by its strength, and a strength to begin at. A law that
-    # cannot move as much as drawn is drawn again.
+    """Draw a law, its strength and the share it moves, log-uniformly between two aims."""
+    # `draw` returns a law, the readings by its strength, and a starting strength. A law that cannot
+    # move the drawn share is drawn again.
     for _ in range(_LAWS):
         law, seen, begin = draw()
         aim = float(np.exp(generator.uniform(*np.log(aims))))
@@ -80,14 +80,14 @@ def drawn_as_strong[L](
             return law, *scaled_to(aim, seen, begin)
         except OutOfReachError:
             continue
-    raise RuntimeError(f'no law of {_LAWS} moves {100.0 * aims[0]:.0f} % of a signal')
+    raise RuntimeError(f'none of {_LAWS} laws moves {100.0 * aims[0]:.0f} % of a signal')
 
 
 def left(bare: PlantDescription, true: PlantDescription, command: Array) -> float:
-    """What a refit leaves of a law, over the noise (rms), of the signal that shows it most."""
+    """Residual of a law after a refit, over the noise (rms), in the signal that shows it most."""
 
-    # The refit is linear, around the rig without the law, and holds the rig's numbers to the
-    # spreads from which they are drawn. Commands (N, J) are shaft angles in rad, every ms.
+    # The refit is linear, around the rig without the law, with the spreads of the rig's parameters
+    # as prior. Commands (N, J) are shaft angles in rad, every ms.
     def seen(plant: PlantDescription) -> list[Array]:
         return in_noise(read(plant, command).signals(), bare.sensors)
 

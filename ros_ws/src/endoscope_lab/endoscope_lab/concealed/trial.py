@@ -1,4 +1,4 @@
-"""`endoscope bench concealed`: what is said of rigs with something drawn and concealed."""
+"""`endoscope bench concealed`: blind benchmark of explanations on rigs with injected effects."""
 
 import argparse
 import math
@@ -25,7 +25,7 @@ from endoscope_lab.concealed.judge import (
 from endoscope_lab.concealed.readings import misfit
 from endoscope_lab.concealed.row import Row, differences, rows_of, table
 from endoscope_lab.concealed.sets import (
-    all_are_said,
+    all_are_reported,
     all_hold,
     judged_contests,
     mean_size,
@@ -60,40 +60,41 @@ def run(args: argparse.Namespace) -> int:
 
 
 def explained(stratum: str, seed: int) -> Row:
-    """Draw a case, explain it on one core, and judge what is said."""
+    """Draw a case, explain it on one core, and judge the explanation."""
     return row_of(drawn_case(stratum, seed))
 
 
 def explanation_of(case: Case) -> tuple[Explanation, float]:
-    """Explain a case on one core; also, how many seconds that took."""
+    """Explain a case on one core, and measure how many seconds that takes."""
     with threadpool_limits(1):
         begun = time.monotonic()
-        said = explain_recording(
+        explanation = explain_recording(
             case.recording, case.described, baseline=case.baseline, left_out=case.left_out, jobs=1
         )
-        return said, time.monotonic() - begun
+        return explanation, time.monotonic() - begun
 
 
 def row_of(case: Case) -> Row:
-    """Explain a case on one core, and judge what is said."""
+    """Explain a case on one core, and judge the explanation."""
     return judged_row(case, *explanation_of(case))
 
 
-def judged_row(case: Case, said: Explanation, seconds: float) -> Row:
-    """Judge what is said of a case after some seconds."""
-    names = statements(said)
-    errors = [_error(*number) for number in _numbers(case, said)]
-    told = told_from_numbers(case)
-    contests = judged_contests(case, said, told)
+def judged_row(case: Case, explanation: Explanation, seconds: float) -> Row:
+    """Judge the explanation of a case, which took some seconds."""
+    names = statements(explanation)
+    errors = [_error(*number) for number in _numbers(case, explanation)]
+    identifiable = identifiable_laws(case)
+    contests = judged_contests(case, explanation, identifiable)
     judgement = judged(case.laws, names, case.also)
-    if not judgement.false and all_are_said(contests, case.laws):
+    if not judgement.false and all_are_reported(contests, case.laws):
         judgement = replace(judgement, first=True, place=True, stage=True, exact=True)
     in_set, set_size = all_hold(contests), mean_size(contests)
     judgement = replace(judgement, in_set=in_set, set_size=set_size)
-    others = frozenset().union(*(law.ids for law in case.laws if law not in told))
+    others = frozenset().union(*(law.ids for law in case.laws if law not in identifiable))
+    first = judgement.first or judged(identifiable, names, case.also | others).first
     nominal, refitted, augmented = (
         misfit(plant, case.second, case.described.sensors)
-        for plant in (said.nominal, said.refitted, said.augmented)
+        for plant in (explanation.nominal, explanation.refitted, explanation.augmented)
     )
     return Row(
         stratum=case.stratum,
@@ -102,27 +103,27 @@ def judged_row(case: Case, said: Explanation, seconds: float) -> Row:
         note=case.note,
         moved=case.moved,
         left=_left(case),
-        verdict=str(said.verdict),
-        said=tuple(f'{each.name}@{each.joint}' for each in names),
+        verdict=str(explanation.verdict),
+        reported=tuple(f'{each.name}@{each.joint}' for each in names),
         held=sum(error <= 1.0 for error in errors),
         intervals=len(errors),
         nominal=nominal,
         refitted=refitted,
         augmented=augmented,
         seconds=seconds,
-        beyond_form=said.beyond_form,
+        beyond_form=explanation.beyond_form,
         errors=tuple(INTERVAL_WIDTH * error for error in errors),
         contests=tuple(each.kept() for each in contests),
-        told=tuple(map(_named, told)),
-        first_of_told=judgement.first or judged(told, names, case.also | others).first,
+        identifiable=tuple(map(_named, identifiable)),
+        first_of_identifiable=first,
         **vars(judgement),
     )
 
 
-def told_from_numbers(case: Case) -> tuple[Law, ...]:
-    """Laws of which a refit of the rig's numbers leaves more than noise, each alone in the rig."""
-    # A smaller pretension and slack are one thing in the wires of most motions, and gravity is one
-    # with the joint's stiffness and rest angle: what is not there to be seen cannot be named.
+def identifiable_laws(case: Case) -> tuple[Law, ...]:
+    """Laws of which a refit of the rig's numbers leaves more than noise, each injected alone."""
+    # Under most motions slack is confounded with a smaller pretension, and gravity with stiffness
+    # and rest angle of the joint.
     if case.true == case.bare:
         return case.laws
     command = case.recording.command.values
@@ -145,29 +146,29 @@ def _named(law: Law) -> str:
 
 
 def _left(case: Case) -> float:
-    """What a refit leaves of the laws; NaN where another simulator has them."""
+    """What a refit leaves of the laws, over noise; NaN for laws of another simulator."""
     if case.laws and case.true == case.bare:
         return math.nan
     return left(case.bare, case.true, case.recording.command.values) if case.laws else 0.0
 
 
 def _error(true: float, found: Estimate) -> float:
-    """Error over what the interval allows on that side."""
+    """Error over the half-width of the interval on that side."""
     allowed = found.high - found.value if true > found.value else found.value - found.low
     off = abs(true - found.value)
     return off / allowed if allowed > 0.0 else (0.0 if off == 0.0 else math.inf)
 
 
-def _numbers(case: Case, said: Explanation) -> Iterator[tuple[float, Estimate]]:
-    """True value of each number that is given, and its estimate."""
-    for joint, estimates in said.parameters.items():
+def _numbers(case: Case, explanation: Explanation) -> Iterator[tuple[float, Estimate]]:
+    """True value of each estimated number, and its estimate."""
+    for joint, estimates in explanation.parameters.items():
         true = case.true.joints[joint]
         for name, estimate in estimates.items():
             term = name.removeprefix('friction_profile_')
             terms = (*true.friction_profile, 0.0, 0.0, 0.0, 0.0)
             value = getattr(true, name) if term == name else terms[int(term) - 1]
             yield value, estimate
-    for effect in said.effects:
+    for effect in explanation.effects:
         for spec in case.true.effects:
             if (spec.id, spec.joint) == (effect.id, effect.joint):
                 for each in CATALOGUE[spec.id].parameters:
@@ -186,6 +187,6 @@ def failed(stratum: str, seed: int, error: BaseException) -> Row:
         moved=math.nan,
         left=math.nan,
         verdict='FAILED',
-        said=(),
+        reported=(),
         **vars(wrong),
     )

@@ -1,1 +1,1 @@
-"""The console in a real browser: what happens to the page, and what the motors do then."""
+"""The console in a real browser: events on the page, and the response of the motors."""

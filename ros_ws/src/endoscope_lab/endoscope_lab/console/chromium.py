@@ -1,7 +1,7 @@
-"""The installed Chromium without a window, spoken to by its DevTools protocol.
+"""The installed Chromium without a window, controlled by its DevTools protocol.
 
-Test frameworks keep their pages in front, focused and at full speed, whatever happens to them.  A
-page that is hidden, frozen or killed as it would be on a desk takes the protocol itself.
+Test frameworks keep their pages in front, focused and at full speed. A page that is hidden, frozen
+or killed, as on a desktop, needs the protocol itself.
 """
 
 import itertools
@@ -36,15 +36,15 @@ KEYS = {
     'KeyE': ('e', 69),
     'KeyH': ('h', 72),
 }
-"""Keys by their place on the keyboard: what they type, and their number."""
+"""Keys by their place on the keyboard: key value and key code."""
 
 
 class BrowserError(EndoscopeError, RuntimeError):
-    """The browser is not there, does not answer, or does not do what it is told."""
+    """The browser is missing, does not answer, or refuses a command."""
 
 
 class Chromium(ClosedOnExit):
-    """A browser with a profile of its own, which ends and is removed with it; else BrowserError."""
+    """A browser with a temporary profile of its own; BrowserError if it does not start."""
 
     def __init__(self) -> None:
         program = shutil.which('chromium')
@@ -77,26 +77,26 @@ class Chromium(ClosedOnExit):
         return connect(address, max_size=None, compression=None, legacy=True)
 
     def post(self, method: str, session: str = '', **parameters: Any) -> int:
-        """Order something and do not wait for the answer; the order's number."""
+        """Send a command without waiting for the answer; return its number."""
         number = next(self._numbers)
         message = {'id': number, 'method': method, 'params': parameters}
         self._socket.send(json.dumps(message | ({'sessionId': session} if session else {})))
         return number
 
     def call(self, method: str, session: str = '', **parameters: Any) -> dict[str, Any]:
-        """Order something of the browser or of a session's tab; BrowserError if it refuses."""
+        """Send a command to the browser or to a session's tab; BrowserError if it is refused."""
         number = self.post(method, session, **parameters)
         end = time.monotonic() + _PATIENCE_S
         while True:
             try:
-                told = json.loads(self._socket.recv(timeout=max(0.0, end - time.monotonic())))
+                answer = json.loads(self._socket.recv(timeout=max(0.0, end - time.monotonic())))
             except (TimeoutError, ConnectionClosed) as error:
                 raise BrowserError(f'chromium does not answer {method}: {error}') from error
-            if told.get('id') == number:
+            if answer.get('id') == number:
                 break
-        if 'error' in told:
-            raise BrowserError(f'{method}: {told["error"]["message"]}')
-        return dict(told['result'])
+        if 'error' in answer:
+            raise BrowserError(f'{method}: {answer["error"]["message"]}')
+        return dict(answer['result'])
 
     def tab(self, address: str) -> 'Tab':
         """Open an address in a tab in front of all others."""
@@ -108,12 +108,12 @@ class Chromium(ClosedOnExit):
                 self.call('Target.closeTarget', targetId=target['targetId'])
 
     def page_processes(self) -> list[int]:
-        """Numbers of the processes that run pages."""
+        """Ids of the processes that run pages."""
         found = self.call('SystemInfo.getProcessInfo')['processInfo']
         return [process['id'] for process in found if process['type'] == 'renderer']
 
     def kill(self) -> None:
-        """End it at once, as the kernel does where memory is short."""
+        """End it at once, as the kernel does when memory is short."""
         with suppress(ProcessLookupError):
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
@@ -135,11 +135,11 @@ class Tab:
         self.to_front()
 
     def call(self, method: str, **parameters: Any) -> dict[str, Any]:
-        """Order something of the tab, as :meth:`Chromium.call`."""
+        """Send a command to the tab, as :meth:`Chromium.call`."""
         return self._browser.call(method, self._session, **parameters)
 
     def post(self, method: str, **parameters: Any) -> None:
-        """Order something of the tab and do not wait for the answer."""
+        """Send a command to the tab without waiting for the answer."""
         self._browser.post(method, self._session, **parameters)
 
     def to_front(self) -> None:
@@ -147,7 +147,7 @@ class Tab:
         self._browser.call('Target.activateTarget', targetId=self.target)
 
     def key(self, code: str, down: bool, *, repeats: bool = False) -> None:
-        """Press a key of :data:`KEYS`, have the keyboard repeat it, or let go of it."""
+        """Press, repeat or release a key of :data:`KEYS`."""
         key, number = KEYS[code]
         self.call(
             'Input.dispatchKeyEvent',
@@ -159,16 +159,16 @@ class Tab:
         )
 
     def value(self, expression: str) -> Any:
-        """What an expression, or its promise, comes to in the page; BrowserError if it throws."""
-        told = self.call(
+        """Value of an expression, or of its promise, in the page; BrowserError if it throws."""
+        answer = self.call(
             'Runtime.evaluate', expression=expression, returnByValue=True, awaitPromise=True
         )
-        if 'exceptionDetails' in told:
-            raise BrowserError(f'{expression}: {told["exceptionDetails"]}')
-        return told['result'].get('value')
+        if 'exceptionDetails' in answer:
+            raise BrowserError(f'{expression}: {answer["exceptionDetails"]}')
+        return answer['result'].get('value')
 
     def minimise(self, minimised: bool = True) -> None:
-        """Minimise the window, or have it back."""
+        """Minimise the window, or restore it."""
         window = self._browser.call('Browser.getWindowForTarget', targetId=self.target)
         state = 'minimized' if minimised else 'normal'
         self._browser.call(

@@ -1,4 +1,4 @@
-"""`endoscope bench console`: how soon the slave stops, whatever happens to the page."""
+"""`endoscope bench console`: time until the slave stops after an event on the page."""
 
 import argparse
 import math
@@ -33,12 +33,12 @@ _COLUMNS = (
     'load',
 )
 _AIM_MS = 150.0
-# Without a load the last word of a motion comes within 0.05 s of the one that ends it.
+# Without load, the last message of a motion comes within 0.05 s of the one that ends it.
 _SETTLED_S, _WATCHED_S = 0.3, 0.3
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print a row for each event and a line for each other figure; 1 if something crept."""
+    """Print a row for each event and a line for each other figure; return 1 if something crept."""
     names = tuple(EVENTS) if args.only == ['all'] else tuple(args.only or _USUAL)
     require_known('event', names, EVENTS)
     print(f'{"real" if args.real_time else "simulated"} time, {today_and_machine()}', flush=True)
@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _trials(name: str, hand: Hand, repetitions: int) -> int:
-    """Let an event happen again and again, and print its row; how often something crept."""
+    """Repeat an event and print its row; return how often something crept."""
     outcomes: list[Outcome] = []
     try:
         for k in range(repetitions):
@@ -74,7 +74,7 @@ def _trials(name: str, hand: Hand, repetitions: int) -> int:
             outcomes.append(undergo(EVENTS[name], hand, _SETTLED_S, _WATCHED_S))
             EVENTS[name].is_over(hand)
     finally:
-        # Hours of trials are not lost with a browser that ends.
+        # Hours of trials are not lost when the browser ends.
         print('\r\x1b[K', end='', file=sys.stderr)
         if outcomes:
             print(_row(name, outcomes), flush=True)
@@ -103,8 +103,8 @@ _PAINTED = "performance.getEntriesByName('first-contentful-paint')[0]?.startTime
 
 
 def first_motion(hand: Hand, began_s: float) -> str:
-    """Time from a start of the program, by the monotonic clock, to a slave in motion, in words."""
-    # The hand's browser was started when all nodes were heard.
+    """Line on the time from the program's start, by the monotonic clock, to a moving slave."""
+    # The hand's browser started once all nodes published.
     hand.move()
     took_s = time.monotonic() - began_s
     painted_ms = hand.tab.value(_PAINTED)
@@ -116,8 +116,8 @@ def first_motion(hand: Hand, began_s: float) -> str:
 
 
 def input_latency(hand: Hand, inputs: int) -> Iterator[str]:
-    """From a pressed key to the first change of the handle, and of ``motor/servo_jp``, in words."""
-    # The operator has Space down and the slave at rest before each.
+    """Lines on the latency from a key to the handle, and to ``motor/servo_jp``."""
+    # Before each input, the operator holds Space and the slave is at rest.
     console = hand.console
     took_ms: dict[str, list[float]] = {'master/measured_js': [], 'motor/servo_jp': []}
     while min(map(len, took_ms.values())) < inputs:

@@ -1,4 +1,4 @@
-"""What may happen to the page of an operator who holds on, and what the motors do then."""
+"""Events on the page of an operator who holds a key, and the response of the motors."""
 
 import os
 import signal
@@ -14,22 +14,22 @@ _RELEASED_S = 10.0
 
 @dataclass(frozen=True)
 class Event:
-    """Something that ends the motion."""
+    """An event that ends the motion."""
 
-    # Makes it happen, and waits for no answer.
+    # Triggers the event, without waiting for an answer.
     happens: Callable[[Hand], object]
-    # Brings the page back, or another one, in front of an operator who still holds on.
+    # Restores the page, or opens another one, for an operator who still holds the key.
     is_over: Callable[[Hand], object]
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one event led to."""
+    """Response to one event."""
 
     # From the event to the last change of ``motor/servo_jp``.
     last_change_ms: float
-    clutch_ms: float  # from the event to the word that the clutch is free
-    crept: float  # how far a shaft's goal went in the time watched, rad
+    clutch_ms: float  # from the event to the message that the clutch is free
+    crept: float  # travel of a shaft's goal in the watched time, rad
     load: float  # load average of the machine
 
 
@@ -60,7 +60,7 @@ def _freeze(hand: Hand) -> None:
 
 def _thaw(hand: Hand) -> None:
     hand.tab.post('Page.setWebLifecycleState', state='active')
-    # It counts as hidden until it comes to the front.
+    # The page counts as hidden until it comes to the front.
     hand.browser.call('Target.createTarget', url='about:blank')
     _uncover(hand)
 
@@ -95,18 +95,18 @@ EVENTS = {
     'network silent': Event(_silence(True), _silence(False)),
     'network cut': Event(lambda hand: hand.network.cut(), _stay),
 }
-"""By what a bystander would say of them."""
+"""Events by a short description."""
 
 
 def undergo(event: Event, hand: Hand, settled_s: float, watched_s: float) -> Outcome:
-    """Let something happen to an operator who holds the slave in motion."""
-    # What moves within `settled_s` of the word on the clutch still counts to the motion; the motors
+    """Trigger an event while an operator holds the slave in motion."""
+    # Changes within `settled_s` of the message on the clutch still belong to the motion; the motors
     # are watched for `watched_s` after that.
     console = hand.console
     for _ in range(_TRIES):
         console.forget()
         hand.move()
-        # A machine that was busy may have let go meanwhile.
+        # On a busy machine the clutch may have been released meanwhile.
         if hand.moves:
             break
     at_ns = time.time_ns()

@@ -1,4 +1,4 @@
-"""An operator at the page in a browser: takes the controls, holds a key, and lets go."""
+"""An operator at the page in a browser: takes the controls, holds keys, and releases them."""
 
 import time
 from contextlib import suppress
@@ -12,11 +12,11 @@ from endoscope_lab.console.served_console import PATIENCE_S, ServedConsole
 _MOVING_NS = 60_000_000
 _LOOK_S = 0.05
 _ANSWERED_S = 0.5
-# Who is not followed by then was let go of, on a machine that does not run everything in time.
+# After this time without following, a busy machine has released the clutch.
 _FOLLOWED_S = 2.0
 _LAMP = "document.getElementById('lamp')?.textContent"
 _STEP = 'document.body?.dataset.step'
-# Calibrate, which can be left out, or hold and move.
+# Steps: calibrate, which is optional, and hold and move.
 _MAY_MOVE = ('3', '5')
 _CLAIM = "document.getElementById('claim')"
 _MINE = f'{_CLAIM}?.textContent === "Give back"'
@@ -26,13 +26,13 @@ _TEXT = 'document.body?.innerText'
 
 
 class Hand(ClosedOnExit):
-    """An operator at a page, with a network between it and its console."""
+    """An operator at a page, with a network between the page and its console."""
 
     def __init__(self, console: ServedConsole, network: Relay) -> None:
         self.console = console
         self.network = network
         self._address = f'{network.address}/#token={console.token}'
-        # Numbers of the processes that ran pages when the slave was last set in motion.
+        # Ids of the processes that ran pages when the slave was last set in motion.
         self.page_processes: list[int] = []
         self.browser = Chromium()
         self._held: list[str] = []
@@ -52,13 +52,13 @@ class Hand(ClosedOnExit):
         self.renew_tab()
 
     def _seen(self, expression: str) -> Any:
-        """What an expression comes to; None in a page that is being replaced."""
+        """Value of an expression; None in a page that is being replaced."""
         with suppress(BrowserError):
             return self.tab.value(expression)
         return None
 
     def take_controls(self, enable: bool = True) -> None:
-        """Become the operator, of an enabled slave if wanted."""
+        """Take the controls, and enable the slave if wanted."""
         self.let_go()
         end = time.monotonic() + PATIENCE_S
         answer = ''
@@ -80,7 +80,7 @@ class Hand(ClosedOnExit):
         self._held.append(code)
 
     def repeats(self) -> None:
-        """Have the keyboard repeat what is down, as it does for whoever holds on."""
+        """Repeat the keys that are down, as a keyboard does."""
         for code in self._held:
             self.tab.key(code, True, repeats=True)
 
@@ -90,7 +90,7 @@ class Hand(ClosedOnExit):
         self._held = []
 
     def hold(self, *codes: str) -> None:
-        """Hold keys until the lamp says that the slave follows; again where it did not."""
+        """Hold keys until the lamp shows that the slave follows; retry if it does not."""
         end = time.monotonic() + PATIENCE_S
         since = -_FOLLOWED_S
         while self._seen(_LAMP) != 'FOLLOWING':
@@ -100,7 +100,7 @@ class Hand(ClosedOnExit):
             if self._held and now - since > _FOLLOWED_S:
                 self.let_go()
             elif not self._held:
-                # They may have been lost meanwhile.
+                # The controls may have been lost meanwhile.
                 self.take_controls()
                 if self._seen(_STEP) in _MAY_MOVE:
                     for code in codes:
@@ -109,7 +109,7 @@ class Hand(ClosedOnExit):
             self.console.passes(_LOOK_S)
 
     def move(self) -> None:
-        """Hold on until the slave is in motion, towards the middle or away from it."""
+        """Hold keys until the slave moves, towards the middle or away from it."""
         last = time.monotonic() + PATIENCE_S
         while time.monotonic() < last:
             goals = self.console.motors.angles
@@ -125,12 +125,12 @@ class Hand(ClosedOnExit):
         raise BrowserError('the slave follows and does not move')
 
     def follow_link(self) -> None:
-        """Follow a link to another site, where there is nothing to be seen."""
+        """Follow a link to another, empty site."""
         self.tab.post('Page.navigate', url=f'http://localhost:{self.console.port}/')
 
     @property
     def moves(self) -> bool:
-        """Whether the clutch is held, and the newest goals of the shafts changed."""
+        """Whether the clutch is held and the latest goals of the shafts change."""
         console = self.console
         console.client.hear()
         changes = console.motors.changes_ns()

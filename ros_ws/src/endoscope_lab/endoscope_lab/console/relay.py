@@ -16,13 +16,13 @@ _AT_ONCE = struct.pack('ii', 1, 0)
 
 
 class Relay(ClosedOnExit):
-    """Passes TCP connections of 127.0.0.1 on to a port, both ways."""
+    """Forwards TCP connections of 127.0.0.1 to a port, both ways."""
 
     def __init__(self) -> None:
         self._listening = socket.create_server(('127.0.0.1', 0))
         self.port: int = self._listening.getsockname()[1]
-        self.target = 0  # port to which it passes on
-        self.silent = False  # passes nothing on: what is sent meanwhile arrives late
+        self.target = 0  # port to which it forwards
+        self.silent = False  # forwards nothing, so that data arrive late
         self._open = True
         self._cut = False
         self._peers: dict[socket.socket, socket.socket] = {}
@@ -33,11 +33,11 @@ class Relay(ClosedOnExit):
 
     @property
     def address(self) -> str:
-        """Under which a page is reached through it."""
+        """Address of the page through the relay."""
         return f'http://127.0.0.1:{self.port}'
 
     def cut(self) -> None:
-        """Reset every connection, as a router does that was switched off and on."""
+        """Reset every connection, as a router does when it is switched off and on."""
         self._cut = True
 
     def _run(self) -> None:

@@ -1,4 +1,4 @@
-"""`endoscope console` with its graph, as a person starts it, and what its motors are told."""
+"""`endoscope console` with its graph, as a person starts it, and the commands to its motors."""
 
 import math
 import os
@@ -26,17 +26,17 @@ from endoscope_nodes.topics import Qos
 
 PATIENCE_S = 150.0
 SAME_RAD = 1e-9
-"""Angles that are nearer to each other are the same."""
+"""Angles that differ by less are the same."""
 _COMMAND = (sys.executable, '-m', 'endoscope_bringup.cli', 'console', '--port', '0')
 _DEEP = profile(Qos(20_000, reliable=False))
 
 
 class ConsoleError(EndoscopeError, RuntimeError):
-    """The program does not start, or what is waited for does not come."""
+    """The program does not start, or a condition times out."""
 
 
 class Heard:
-    """Angles of a topic's J joints or motors as they came."""
+    """Angles of a topic's J joints or motors in the order of reception."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self._reader = JointReader(names)
@@ -51,20 +51,20 @@ class Heard:
         del self.at_ns[:-1], self.angles[:-1]
 
     def changes_ns(self) -> NDArray[np.int64]:
-        """When angles came that differ from the ones before, ns since the epoch, shape (N,)."""
+        """Times of reception of changed angles, ns since the epoch, shape (N,)."""
         if len(self.angles) < 2:
             return np.empty(0, dtype=np.int64)
         steps = np.abs(np.diff(self.angles, axis=0)).max(axis=1)
         return np.asarray(self.at_ns[1:], dtype=np.int64)[steps > SAME_RAD]
 
     def first_change_ms(self, since_ns: int) -> float:
-        """How long after a time in ns angles first changed, in ms; NaN where they did not."""
+        """Time in ms from a time in ns to the first change of angles; NaN if there was none."""
         changes = self.changes_ns()
         after = changes[changes > since_ns]
         return (int(after[0]) - since_ns) * 1e-6 if after.size else math.nan
 
     def travel_since(self, since_ns: int) -> float:
-        """How far an angle has been from the one in force at a time in ns, at most, rad."""
+        """Largest distance in rad of an angle from the one in force at a time in ns."""
         first = max(0, bisect_right(self.at_ns, since_ns) - 1)
         if not self.angles:
             return 0.0
@@ -72,7 +72,7 @@ class Heard:
 
 
 class ServedConsole(ClosedOnExit):
-    """The program, started in a folder and reached under origins of relays too; and a listener."""
+    """The program, started in a folder, with origins of relays allowed; and a subscriber."""
 
     def __init__(
         self,
@@ -95,14 +95,14 @@ class ServedConsole(ClosedOnExit):
                 stdout=log,
                 stderr=subprocess.STDOUT,
             )
-        # Where the handle was said to be, and what the motors were told.
+        # Measured angles of the handle, and commanded angles of the motors.
         self.handle, self.motors = Heard(JOINTS), Heard(MOTORS)
-        self.clutches: list[tuple[int, bool]] = []  # when it was spoken of, and whether it was held
+        self.clutches: list[tuple[int, bool]] = []  # time of reception, and whether it was held
         self._stack = ExitStack()
         self._stack.callback(self._end)
         try:
             self._await_graph()
-            # Another node in the namespace would pass for a graph that answers.
+            # Only now: another node in the namespace would look like a graph that answers.
             self.client = self._stack.enter_context(joined_graph('looker_on', 'endoscope', domain))
             for topic, heard in ((MASTER_MEASURED, self.handle), (MOTOR_COMMAND, self.motors)):
                 self.client.listen(JointState, topic, heard.take, qos=_DEEP)
@@ -129,7 +129,7 @@ class ServedConsole(ClosedOnExit):
         self.clutches.append((received_ns, deserialize_message(data, Joy).buttons[0] == 1))
 
     def forget(self) -> None:
-        """Keep only what is heard from now on, and the last before."""
+        """Forget all samples except the latest ones."""
         self.client.hear()
         self.handle.forget()
         self.motors.forget()
@@ -141,17 +141,17 @@ class ServedConsole(ClosedOnExit):
     def until(
         self, condition: Callable[[], bool], what: str, patience_s: float = PATIENCE_S
     ) -> None:
-        """Listen until something is true; ConsoleError if not in time, or the program has ended."""
+        """Listen until a condition holds; ConsoleError on a timeout or if the program has ended."""
         end = time.monotonic() + patience_s
         while not self.client.wait_until(condition, 0.5):
             if time.monotonic() > end or self._process.poll() is not None:
                 raise ConsoleError(
-                    f'{what} does not come; {self.client.state} {self.client.why}; the console '
-                    f'said {self.log.read_text()[-2000:]}'
+                    f'timed out waiting for {what}; {self.client.state} {self.client.why}; log of '
+                    f'the console: {self.log.read_text()[-2000:]}'
                 )
 
     def released_ns(self, since_ns: int) -> int | None:
-        """When the clutch was first said to be free after a time; None where it was not."""
+        """Time of the first message of a free clutch after a time; None if there was none."""
         return next((at for at, held in self.clutches if at >= since_ns and not held), None)
 
     def _end(self) -> None:
@@ -164,5 +164,5 @@ class ServedConsole(ClosedOnExit):
                 self._process.wait()
 
     def close(self) -> None:
-        """End program and graph as Ctrl-C does."""
+        """End program and graph, as Ctrl-C does."""
         self._stack.close()

@@ -1,4 +1,4 @@
-"""Data sets of simulated calibrations, from which the classifier and its benchmarks work."""
+"""Data sets of simulated calibrations, for the classifier and its benchmarks."""
 
 import hashlib
 import json
@@ -25,7 +25,7 @@ from endoscope_lab.dataset.rig_variation import (
 )
 
 CLASSES_DEG = (40, 50, 60, 70, 80, 90, 100)
-"""Sizes of backlash that the classifier tells apart, deg."""
+"""Classes of backlash size that the classifier distinguishes, deg."""
 PER_CLASS = 30
 SIZE_SPREAD_DEG = 1.0
 ARRAYS_FILE = 'recordings.npz'
@@ -35,7 +35,7 @@ _MOST_RIGS = 1000
 
 @dataclass(frozen=True)
 class CalibrationRecording:
-    """What equation 2 of the first paper collects, N samples at 1 kHz, J = 2 joints.
+    """The data of equation 2 of the first paper, N samples at 1 kHz, J = 2 joints.
 
     N = 9000 for the first paper's sinusoid.
     """
@@ -108,13 +108,13 @@ def make_dataset(
 ) -> CalibrationDataset:
     """Simulate the data set; each recording is of another tube.
 
-    The same seed gives the same recordings, and more of them with a greater `per_class`. Rigs,
-    tubes and sizes do not depend on the `motion` that is recorded: the size is always that under
-    the sinusoid. All recordings may be of `one_instrument`, as mounted, whose pretension may be set
-    by hand before each. `progress` is called with the number of recordings done and to be done.
+    The same seed gives the same recordings; a larger `per_class` adds further ones. Rigs, tubes and
+    sizes do not depend on the recorded `motion`: the size is always that under the sinusoid. All
+    recordings may be of `one_instrument`, whose pretension may be set again before each recording.
+    `progress` is called with the numbers of finished and of all recordings.
 
-    EndoscopeError if `per_class` is not positive or `seed` is negative, if the pretension is to be
-    reset of instruments of which each is another anyway, or if there is no motion of that name.
+    EndoscopeError if `per_class` is not positive or `seed` is negative, if the pretension of many
+    instruments is to be reset, or for an unknown motion.
     """
     calibration = calibration_motion(motion)
     if per_class < 1 or seed < 0:
@@ -233,9 +233,9 @@ def _draw(
 
 
 def _of_all_classes(seed: int) -> Instrument:
-    """An instrument that tubes give the smallest and the greatest of the sizes.
+    """An instrument that has the smallest and the largest size in some tube.
 
-    Hardly any has both in evenly bent tubes; where the friction sits along the tube matters too.
+    In evenly bent tubes hardly any has both, so that the unevenness of the friction is used too.
     """
     uneven = 0.75 * GREATEST_UNEVENNESS
     ends = (CLASSES_DEG[0] - SIZE_SPREAD_DEG, uneven), (CLASSES_DEG[-1] + SIZE_SPREAD_DEG, -uneven)

@@ -1,4 +1,4 @@
-"""Instruments as they come out of the workshop, in tubes as a patient bends them."""
+"""Instruments with manufacturing tolerances, in tubes as a patient bends them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -28,26 +28,26 @@ RELATIVE_SPREAD = {
     'motor_bandwidth': 0.05,
     'motor_damping_ratio': 0.05,
 }
-"""Half-widths of uniform relative spreads from instrument to instrument, by manufacture and wear.
+"""Half-widths of uniform relative spreads between instruments, by manufacture and wear.
 
-Friction of a wire in its sheath goes from that of a fresh lubricant to that of a dry one."""
+Friction of a wire in its sheath ranges from a fresh to a dry lubricant."""
 
 JOINT_SHARE = 0.2
-"""The joints of one instrument are made alike: they share all but this part of its spread."""
+"""Share of the spread that differs between the joints of one instrument; the rest is common."""
 PRETENSION_DEVIATION = 0.1
 TIGHTENING_SPREAD = 0.1
 GREATEST_UNEVENNESS = 0.4
-"""Half-width of the first coefficient of the friction profile: where along its length the tube is
-bent; at the end, friction is twice what it is at the motor."""
+"""Half-width of the first coefficient of the friction profile, by where the tube is bent along its
+length; at the largest, friction at the tip is twice that at the motor."""
 
 
 @dataclass(frozen=True)
 class Instrument:
-    """How an instrument differs, joint by joint, from the one that was recorded."""
+    """Differences of an instrument from the recorded one, joint by joint."""
 
     factors: Mapping[str, Mapping[str, float]]  # on parameters, by their names
-    pretension: Mapping[str, float]  # what the wires are tighter by, N
-    tightening: Mapping[str, float]  # what the pretension profile is higher by
+    pretension: Mapping[str, float]  # added to the pretension, N
+    tightening: Mapping[str, float]  # added to the pretension profile
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class TubeConfiguration:
 
     plant: PlantDescription  # both joints
     bend: float  # sum of the tube's bends, rad
-    # Where the tube is bent: what the first coefficient of the friction profile is higher by.
+    # Added to the first coefficient of the friction profile, by where the tube is bent.
     unevenness: float
     # Backlash size of each joint in rad under the calibration sinusoid.
     joint_sizes: tuple[float, ...]
@@ -68,10 +68,10 @@ class TubeConfiguration:
 
 
 def random_instrument(generator: np.random.Generator, widening: float = 1.0) -> Instrument:
-    """An instrument that is off by what manufacture, wear and handling give.
+    """An instrument with random deviations of manufacture, wear and handling.
 
-    The relative spreads are `RELATIVE_SPREAD`, uniform, four fifths of each common to both joints;
-    pretension is set by hand with a standard deviation of 0.1 N. All are `widening` times as wide.
+    Relative spreads are uniform by `RELATIVE_SPREAD`, with four fifths of each common to both
+    joints; the pretension has a standard deviation of 0.1 N. All are widened by `widening`.
     """
     common = {key: generator.uniform(-1.0, 1.0) for key in RELATIVE_SPREAD}
     own = {name: {key: generator.uniform(-1.0, 1.0) for key in RELATIVE_SPREAD} for name in JOINTS}
@@ -90,7 +90,7 @@ def random_instrument(generator: np.random.Generator, widening: float = 1.0) -> 
 
 
 def with_pretension_reset(instrument: Instrument, generator: np.random.Generator) -> Instrument:
-    """The same instrument, whose pretension was set by hand once more."""
+    """The same instrument with its pretension set again."""
     other = random_instrument(generator)
     return replace(instrument, pretension=other.pretension, tightening=other.tightening)
 
@@ -146,8 +146,8 @@ def configuration_of_size(
 ) -> TubeConfiguration | None:
     """Bend the tube until the mean backlash size of both joints is `size` (rad).
 
-    None where the straight tube gives this instrument a greater size, or the most bent one a
-    smaller one or no loop at all, because friction holds the joint.
+    None if the size is larger even in the straight tube, or smaller even in the most bent one, or
+    if there is no loop because friction holds the joint.
     """
 
     def excess(bend: float) -> float:

@@ -1,4 +1,4 @@
-"""Rigs without end for the training of the classifier: drawn from a seed, simulated, never kept."""
+"""Rigs for the training of the classifier: drawn from a seed and simulated, not stored."""
 
 import math
 from collections.abc import Callable
@@ -25,7 +25,7 @@ Progress = Callable[[int, int], None]
 
 LEAST_SIZE, GREATEST_SIZE = np.deg2rad([24.0, 128.0])
 WIDENING = 1.25
-"""Instruments trained on are off by so much more than those that the classifier is to know."""
+"""Factor on the spreads of training instruments, over those that the classifier must know."""
 DIFFERING = (
     'pretension',
     'pretension_profile',
@@ -39,12 +39,12 @@ DIFFERING = (
     'motor_bandwidth',
 )
 FADING = ('joint_rest_angle', 'joint_presliding_spread', 'section_straight_angle')
-"""Numbers in which the nominal slave is another instrument, and those that it has none of."""
+"""Parameters in which the nominal slave differs as an instrument, and those that it lacks."""
 _EXTREME = 0.2
 _STRAIGHT, _BENT = np.deg2rad([60.0, 240.0])
 _SLIPPERY, _ROUGH = (0.1, 0.8), (1.0, 1.5)
 _DRAWS = 10
-"""For each rig held out, at most."""
+"""Largest number of draws for each rig held out."""
 _EARLIER = 1000
 """Samples of the motion before the calibration."""
 
@@ -67,9 +67,9 @@ def training_rigs(
     progress: Progress | None = None,
     sizes: tuple[float, float] = (LEAST_SIZE, GREATEST_SIZE),
 ) -> TrainingRigs:
-    """Rigs of wide spreads with tubes of any of the sizes in rad, from sample `begin` on.
+    """Rigs of wide spreads with sizes in a range in rad, recorded from sample `begin` on.
 
-    One of five is nearly straight and slippery, one of five very bent and rough; all begin from
+    One of five is nearly straight and slippery, one of five strongly bent and rough; all start at
     the end of a random earlier motion.
     """
 
@@ -96,15 +96,15 @@ def held_out_rigs(
     progress: Progress | None = None,
     share: float = 0.0,
 ) -> TrainingRigs:
-    """Rigs as data sets hold them, none of them trained on, as many nearest to each class.
+    """Rigs as in data sets, not used in training, equally many nearest to each class.
 
-    They are off from the recorded instrument, or for a `share` of one from the nominal slave.
-    Fewer are found where an instrument hardly has a class, as the nominal slave has 40 deg.
+    They vary around the recorded instrument, or for a `share` of one around the nominal slave.
+    Fewer are found if an instrument hardly has a class, as the nominal slave has 40 deg.
     """
     left = dict.fromkeys(CLASSES_DEG, math.ceil(count / len(CLASSES_DEG)))
 
     def draw(generator: np.random.Generator) -> PlantDescription:
-        # Small sizes, which are rare, are those of nearly straight tubes.
+        # Nearly straight tubes are drawn more often, since their small sizes are rare.
         return _tube(generator, (0.0, MOST_BENT * generator.random()), share=share)
 
     def wanted(size: float) -> bool:
@@ -122,7 +122,7 @@ def held_out_rigs(
 def strange_rigs(
     seed: int, count: int, motion: str, begin: int, progress: Progress | None = None
 ) -> TrainingRigs:
-    """Rigs with slack wires, and motors that did something else than a calibration."""
+    """Rigs with slack wires, and rigs whose motors did not move as in a calibration."""
     recorded = calibration_motion(motion)
     found = []
     for number in range(count):
@@ -169,7 +169,7 @@ def _simulated(
         try:
             plant = draw(generator)
         except ValueError:
-            # Widened spreads leave what a plant may be, now and then.
+            # Widened spreads sometimes exceed the bounds of a plant.
             continue
         earlier = _earlier_motion(generator, len(plant.joints))
         moved = np.concatenate([earlier, calibration_command(plant, sinusoid)])
@@ -217,8 +217,9 @@ def _tube(
 def towards_nominal(plant: PlantDescription, share: float) -> PlantDescription:
     """The same tube and spreads on an instrument between the recorded one and the nominal slave.
 
-    The two differ by more than instruments of one make do: in the radius of a joint by 14 %.
-    Numbers go a share of the way by their logarithms; what the nominal slave has none of fades.
+    The two differ by more than instruments of one make, in the radius of a joint by 14 %.
+    Parameters are interpolated by a share of their logarithms; those that the nominal slave lacks
+    fade.
     """
     recorded, nominal = shipped_family().joint(0.0), SLAVE
     left = max(1.0 - share, 0.0)

@@ -1,1 +1,1 @@
-"""Breaks what the layers of safety guard against in the running graph, and measures the answer."""
+"""Fault injection: faults that the layers of safety guard against, and how the graph responds."""

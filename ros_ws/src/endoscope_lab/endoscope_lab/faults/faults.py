@@ -1,4 +1,4 @@
-"""`endoscope bench faults`: what the slave does when nodes die, stall or have a rival."""
+"""`endoscope bench faults`: the slave when nodes die or stall and publishers compete."""
 
 import argparse
 import os
@@ -32,12 +32,12 @@ _COLUMNS = (
     'recording',
     'load',
 )
-# A step is bounded but for rounding.
+# The bound of a step, with rounding.
 _SHARE = 1.001
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print a row for each fault; return 1 if something moved that was not asked to."""
+    """Print a row for each fault; return 1 if anything moved without a command."""
     if args.motors:
         return motor_faults.run(args.only)
     faults = chosen('fault', args.only, COMPOSED_FAULTS if args.composed else PROCESS_FAULTS)

@@ -1,4 +1,4 @@
-"""What the slave does when motors or master fail, and how fast."""
+"""Response of the slave to faults of motors and master, and its time."""
 
 import math
 import re
@@ -29,7 +29,7 @@ _COLUMNS = (
 
 
 def run(only: Sequence[str] | None) -> int:
-    """Print a row for each fault; return 1 if one ended otherwise than it must."""
+    """Print a row for each fault; return 1 if the slave did not reach the required state."""
     faults = chosen('fault', only, MOTOR_FAULTS)
     wrong = 0
     print(table_head(*_COLUMNS))
@@ -47,31 +47,31 @@ AFTERMATH_S = 2.0
 
 @dataclass(frozen=True)
 class MotorFault:
-    """Something that goes wrong in motion."""
+    """A fault that is injected in motion."""
 
     what: str  # in words
-    inject: Callable[[MotorRig], object]  # makes it happen
-    # Operating state that follows; ``ENABLED`` for a fault that motion survives or that only ends
-    # it.
+    inject: Callable[[MotorRig], object]
+    # Operating state that must follow; ``ENABLED`` for a fault that motion survives, or that only
+    # ends the motion.
     ends_in: str = 'FAULT'
     stops: bool = True  # the shafts stand still afterwards
-    cause: str = ''  # pattern of words that the cause of the FAULT must hold
+    cause: str = ''  # pattern that the cause of the FAULT must match
     apart: tuple[str, ...] = ()  # nodes that must be processes of their own
 
 
 @dataclass(frozen=True)
 class FaultOutcome:
-    """What followed a fault."""
+    """Response to a fault."""
 
     what: str  # the fault
     state: str  # operating state at the end
     cause: str  # of the FAULT; empty without one
-    # Seconds from the fault to FAULT and to the shafts' standing still; None if they never did.
+    # Seconds from the fault to FAULT, and to standstill of the shafts; None if never reached.
     fault_s: float | None
     stopped_s: float | None
     longest_gap_s: float  # longest silence of `motor/measured_js` in the bag after the fault
     faults_in_bag: int  # FAULT messages in the bag after the fault
-    # Largest difference in rad between a reading in the bag and where the servo was at its stamp.
+    # Largest difference in rad between a reading in the bag and the true angle at its stamp.
     largest_error: float
 
     def __str__(self) -> str:
@@ -139,7 +139,7 @@ MOTOR_FAULTS: dict[str, MotorFault] = {
     'motor driver killed': MotorFault(
         'motor driver killed (SIGKILL)',
         lambda rig: rig.kill('motor_driver'),
-        # Whoever misses it first says so.
+        # Reported by whichever node misses it first.
         cause='motor/measured_js has been silent|no measured position',
         apart=('motor_driver',),
     ),
@@ -153,7 +153,7 @@ def undergo(
     patience: float | None = None,
     domain: int | None = None,
 ) -> FaultOutcome:
-    """Make a fault happen in motion, and look at what follows, for `aftermath` s at least."""
+    """Inject a fault in motion, and observe the response for at least `aftermath` s."""
     with MotorRig(folder, fault.apart, patience, domain) as rig:
         rig.enable_and_move()
         began, began_ns = time.monotonic(), time.time_ns()

@@ -51,10 +51,9 @@ _NODES: dict[str, type] = {
 class MotorRig(ClosedOnExit):
     """Master, compensator, motor driver, supervisor and recorder, with two emulated servos.
 
-    The master plays ``60 sin t``, which passes uncompensated. The tension of the wires is the
-    rig's own to say. Nodes `apart` live in processes of their own, so that they can be killed.
-    Silence of the servos for `patience` s is a fault. The folder takes the terminal's link and the
-    bag.
+    The master plays ``60 sin t``, uncompensated. The rig itself publishes the tension of the
+    wires. Nodes `apart` run in processes of their own, so that they can be killed. Silence of the
+    servos for `patience` s is a fault. The folder receives the terminal's link and the bag.
     """
 
     def __init__(
@@ -118,7 +117,7 @@ class MotorRig(ClosedOnExit):
         return parameters
 
     def node(self, name: str) -> EventlessNode:
-        """Give a node of this process; StopIteration if there is none of that name."""
+        """Return a node of this process by name; StopIteration if there is none."""
         return next(node for node in self.runtime.nodes if node.get_name() == name)
 
     @property
@@ -140,11 +139,11 @@ class MotorRig(ClosedOnExit):
             self._wires.publish(time.time_ns(), *(self.tension,) * len(WIRES))
 
     def last_message(self, name: str) -> str:
-        """What a subcomponent said last in the diagnostics."""
+        """Last diagnostic message of a subcomponent."""
         return next((text for _, which, text in reversed(self.messages) if which == name), '')
 
     def wait(self, condition: Callable[[], bool], patience: float = PATIENCE_S) -> bool:
-        """Serve the nodes until something has come true; whether it did within `patience` s."""
+        """Spin the nodes until a condition holds; whether it did within `patience` s."""
         future = Future()
 
         def look() -> None:
@@ -175,7 +174,7 @@ class MotorRig(ClosedOnExit):
             raise RuntimeError(f'the shafts do not move in {self.state or "no state"}')
 
     def block(self, seconds: float) -> None:
-        """Hold the executor of all nodes up once, as an endless callback does."""
+        """Block the executor of all nodes once, as a hanging callback does."""
 
         def hang() -> None:
             timer.cancel()
@@ -188,7 +187,7 @@ class MotorRig(ClosedOnExit):
         self._processes.kill(name)
 
     def stopped_after(self, since: float) -> float | None:
-        """Seconds from ``since`` (monotonic) until both shafts stood still for good; else None."""
+        """Seconds from ``since`` (monotonic) to standstill of both shafts; None if they move."""
         last = since
         for device in (1, 2):
             trace = self.emulator.do('trace', device, since)
@@ -201,7 +200,7 @@ class MotorRig(ClosedOnExit):
         return last - since
 
     def close(self) -> None:
-        """End all nodes and processes; the bag is complete then."""
+        """End all nodes and processes, which completes the bag."""
         try:
             self.runtime.executor.remove_node(self.probe)
             self.probe.destroy_node()

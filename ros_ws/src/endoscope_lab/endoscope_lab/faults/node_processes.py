@@ -1,4 +1,4 @@
-"""The nodes as processes, each of which can be killed, stalled and restarted."""
+"""The nodes as processes that can be killed, stalled and restarted."""
 
 import json
 import multiprocessing
@@ -24,13 +24,13 @@ NODES = (
 )
 GRAPH = 'graph'
 _END_S = 10.0
-# Forked from a process that has imported everything: a node is back within a second, where the
+# Forked from a process that has imported everything: a node restarts within a second, while the
 # imports alone take four.
 _FORK = multiprocessing.get_context('forkserver')
 
 
 class NodeProcesses(ClosedOnExit):
-    """Processes of nodes by name, ``graph`` for all composed; each logs to ``NAME.log``."""
+    """Processes of nodes by name, ``graph`` for all in one; each logs to ``NAME.log``."""
 
     def __init__(self, domain: int, folder: Path) -> None:
         self._domain = domain
@@ -40,12 +40,12 @@ class NodeProcesses(ClosedOnExit):
 
     @property
     def running(self) -> tuple[str, ...]:
-        """Names of the processes that were started and neither killed nor ended since."""
+        """Names of the running processes."""
         return tuple(self._processes)
 
     @property
     def pids(self) -> tuple[int, ...]:
-        """Their numbers."""
+        """Ids of the running processes."""
         return tuple(map(self._pid, self._processes))
 
     def start(self, name: str, parameters: Mapping[str, Mapping[str, object]]) -> None:
@@ -64,7 +64,7 @@ class NodeProcesses(ClosedOnExit):
         self._processes[name] = process
 
     def kill(self, name: str) -> None:
-        """End a process with SIGKILL: it says no last word."""
+        """End a process with SIGKILL, without any shutdown."""
         process = self._processes.pop(name)
         process.kill()
         process.join(_END_S)

@@ -1,4 +1,4 @@
-"""The operator of a running graph: enables, moves the handle, and keeps what the slave did."""
+"""The operator of a running graph: enables it, moves the handle, and records the slave."""
 
 import math
 import time
@@ -31,23 +31,23 @@ _DEEP = profile(Qos(5000))
 _TURN_NS = 4_000_000
 _CLUTCH_TURNS = 25
 _LET_GO_S = 1.0
-# The hand swings at up to 1 rad/s, a shaft at half of that, and steers back to the middle.
+# The hand swings at up to 1 rad/s, a shaft at half of that, and returns to the middle.
 AMPLITUDE, RATE, STEERING = 0.5, 2.0, 0.5
 
 
 class Operator(ClosedOnExit):
     """A handle of 250 Hz with its clutch, or an outside program that writes ``slave/servo_jp``.
 
-    Nothing is sent or heard but in :meth:`serve`; what was heard is judged by its stamps.
+    Messages are sent and received only in :meth:`serve`; samples are judged by their stamps.
 
     `domain`: ROS domain.
-    `source`: ``master``, ``outside``, or ``none`` where the master plays by itself.
+    `source`: ``master``, ``outside``, or ``none`` if the master plays a motion itself.
     `clutch`: whether the hand holds it.
-    `shafts`, `goals`: what `motor/measured_js` and `motor/servo_jp` said.
+    `shafts`, `goals`: samples of `motor/measured_js` and `motor/servo_jp`.
     `sent`: commands sent to `slave/servo_jp`: session, stamp in ns, positions and velocities.
-    `replays`: whether each command is followed by an old one, sent again.
-    `late_ns`: how far stamps are behind.
-    `graph`: what the graph says, and by which it is asked.
+    `replays`: whether each command is followed by a replay of an old one.
+    `late_ns`: delay of the stamps.
+    `graph`: client of the graph, for its state and for requests.
     """
 
     def __init__(self, domain: int) -> None:
@@ -84,7 +84,7 @@ class Operator(ClosedOnExit):
         self._bending = sample
 
     def use(self, source: str) -> bool:
-        """Be the sender of what the source needs, and of nothing else; whether that is new."""
+        """Become the publisher for a source, and of nothing else; whether the source is new."""
         if source == self.source:
             return False
         if self._handle is not None:
@@ -105,26 +105,26 @@ class Operator(ClosedOnExit):
         return True
 
     def press(self, held: bool) -> None:
-        """Press the clutch or let go of it, and say so at once."""
+        """Press or release the clutch, and publish that at once."""
         self.clutch = held
         if self._clutch is not None:
             self._clutch.publish(Joy(buttons=[int(held)]))
 
     def let_go_and_press(self) -> None:
-        """Have the clutch count again: after another one held it, it does once it was let go of."""
+        """Release and press the clutch: after a change of publisher it counts only from then on."""
         self.press(False)
         self.serve(_LET_GO_S)
         self.press(True)
 
     def serve(self, seconds: float, until: Callable[[], bool] = lambda: False) -> bool:
-        """Move and listen for some time, or until something has come true; whether it has."""
+        """Move and listen for some time, or until a condition holds; whether it does."""
         end = time.monotonic_ns() + round(seconds * 1e9)
         while True:
             now = time.monotonic_ns()
             if now >= self._due_ns:
                 if now > self._due_ns + 2 * _TURN_NS:
                     self._due_ns = now
-                # Stamps are a turn apart, however late this process was run.
+                # Stamps are one turn apart, however late this process is scheduled.
                 self._send(self._due_ns + self._to_stamp_ns)
                 self._due_ns += _TURN_NS
             self.graph.hear()
@@ -146,7 +146,7 @@ class Operator(ClosedOnExit):
         speed = tuple(swing - STEERING * x for x in bent)
         stamp = stamp_ns - self.late_ns
         if self.source == 'outside' and self.graph.session != self._entered:
-            # Whoever enters a session starts from the measured pose.
+            # A new session starts from the measured pose.
             self._entered, self._hand = self.graph.session, bent
         self._hand = tuple(a + v * _TURN_NS * 1e-9 for a, v in zip(self._hand, speed, strict=True))
         if self.source == 'master':

@@ -1,4 +1,4 @@
-"""What can befall the processes and topics of the graph, and what follows."""
+"""Faults of the processes and topics of the graph, and the responses to them."""
 
 import math
 import time
@@ -36,19 +36,19 @@ from endoscope_nodes.runtime.qos import COMMAND, EVENT, RESULT, SENSOR_OFFERED
 STALLS_S = (0.2, 0.5, 2.0)
 _AFTERMATH_S = 1.0
 _MOST_TRIES = 10
-_RIVAL_TURNS = 75
+_COMPETING_TURNS = 75
 _TURN_S = 0.004
 
 
 @dataclass(frozen=True)
 class ProcessFault:
-    """Something that goes wrong in motion.
+    """A fault that is injected in motion.
 
-    `inject`: makes it happen.
-    `source`: whose motion it is: ``master`` for the handle, ``motion`` for one that the master
+    `inject`: injects it.
+    `source`: source of the motion: ``master`` for the handle, ``motion`` for one that the master
         plays, ``outside`` for a program that writes `slave/servo_jp` itself.
-    `kills`: process that is gone afterwards.
-    `pauses`: whether the operator himself lets the slave stand and move again.
+    `kills`: process that the fault ends.
+    `pauses`: whether the operator stops the slave and moves it again.
     """
 
     inject: Callable[[ProcessRig], object]
@@ -59,20 +59,20 @@ class ProcessFault:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What followed a fault; angles in rad, times in s.
+    """Response to a fault; angles in rad, times in s.
 
-    `state`, `cause`: operating state before the next enable, and why.
-    `goal_step`, `goal_share`: largest step of `motor/servo_jp`, and the largest in parts of what
-        the shaper allows.
-    `shaft_step`, `shaft_speed`: largest step of a shaft from reading to reading, and its largest
-        speed over 10 ms.
-    `still_s`: from the fault to standstill; None where the motion went on, or the plant died.
-    `unasked`: how far shafts went at rest, with no session open, before the next enable.
+    `state`, `cause`: operating state before the next enable, and its cause.
+    `goal_step`, `goal_share`: largest step of `motor/servo_jp`, and the largest as a share of the
+        bound of the shaper.
+    `shaft_step`, `shaft_speed`: largest step of a shaft between readings, and its largest speed
+        over 10 ms.
+    `still_s`: from the fault to standstill; None if the motion continued, or the plant died.
+    `unasked`: travel of the shafts without an open session, before the next enable.
     `gap_s`: longest time between two readings of the shafts, by their stamps.
-    `enabled_s`: from the next enable to motion; None where that did not come.
-    `before`: what ended the motion before the fault, each time that it was tried again.
-    `bag`: seconds between the last message of a killed recorder's bag and the fault; messages lost
-        by one that lives, below zero.
+    `enabled_s`: from the next enable to motion; None if there was none.
+    `before`: causes that ended the motion before the fault, one for each repeated attempt.
+    `bag`: seconds from the last message in a killed recorder's bag to the fault; for a recorder
+        that survives, the number of lost messages, negative.
     """
 
     state: str
@@ -90,16 +90,16 @@ class Outcome:
 
 
 def undergo(fault: ProcessFault, rig: ProcessRig) -> Outcome:
-    """Make a fault happen at a random instant of the motion, and look at what follows."""
+    """Inject a fault at a random instant of the motion, and observe the response."""
     operator = rig.operator
     if fault.kills == 'recorder' and 'recorder' in rig.processes.running:
-        # A bag of its own, for what is complete is found by reading it.
+        # In a bag of its own, since completeness is found by reading the bag.
         rig.end('recorder')
     before: list[str] = []
     while not _moves(rig, fault.source):
         before.append(operator.graph.why)
         if len(before) > _MOST_TRIES:
-            raise RuntimeError(f'the motion ends before anything breaks: {before[-1]}')
+            raise RuntimeError(f'the motion ends before the fault: {before[-1]}')
     lost, bag = _lost(rig), rig.bag
     fault_ns = since_ns = time.time_ns()
     fault.inject(rig)
@@ -136,7 +136,7 @@ def undergo(fault: ProcessFault, rig: ProcessRig) -> Outcome:
 
 
 def _moves(rig: ProcessRig, source: str) -> bool:
-    """Bring it to move; whether it still does at a random instant."""
+    """Start a motion; whether it still continues at a random instant."""
     operator = rig.operator
     rig.begin(source)
     if rig.enable_and_move() is None:
@@ -146,14 +146,14 @@ def _moves(rig: ProcessRig, source: str) -> bool:
     operator.serve(rig.random.uniform(0.3, 1.5))
     moves = operator.graph.state == 'ENABLED'
     if not moves:
-        # The cause is told within a second.
+        # The cause is published within a second.
         operator.serve(1.1)
     return moves
 
 
 def _lost(rig: ProcessRig) -> int:
-    said = rig.operator.graph.health.get('recorder: recording')
-    return int(said.values.get('lost', 0)) if said else 0
+    status_of_recorder = rig.operator.graph.health.get('recorder: recording')
+    return int(status_of_recorder.values.get('lost', 0)) if status_of_recorder else 0
 
 
 def _complete_to(bag: Path, fault_ns: int) -> float:
@@ -187,11 +187,11 @@ def _press_while_the_driver_stalls(rig: ProcessRig) -> None:
     rig.processes.resume('motor_driver')
 
 
-def _speak(kind: type, topic: str, make: Callable[[ProcessRig], Any], qos: Any) -> ProcessFault:
+def _publish(kind: type, topic: str, make: Callable[[ProcessRig], Any], qos: Any) -> ProcessFault:
     def inject(rig: ProcessRig) -> None:
         message = make(rig)
         publisher = rig.operator.node.create_publisher(kind, topic, qos)
-        for _ in range(_RIVAL_TURNS):
+        for _ in range(_COMPETING_TURNS):
             if hasattr(message, 'header'):
                 stamp = message.header.stamp
                 stamp.sec, stamp.nanosec = divmod(time.time_ns(), 1_000_000_000)
@@ -199,7 +199,7 @@ def _speak(kind: type, topic: str, make: Callable[[ProcessRig], Any], qos: Any) 
             rig.operator.serve(_TURN_S)
         publisher.destroy()
         if topic == MOTOR_COMMAND:
-            # Those were the rival's.
+            # These were from the competing publisher.
             rig.operator.goals.clear()
         if topic == MASTER_CLUTCH:
             rig.operator.let_go_and_press()
@@ -227,10 +227,10 @@ def _clutch(rig: ProcessRig) -> Joy:
     return Joy(buttons=[rig.random.randrange(2)])
 
 
-def _speak_while_disabled(rig: ProcessRig) -> None:
+def _publish_while_disabled(rig: ProcessRig) -> None:
     rig.operator.graph.order('disable')
     rig.operator.serve(0.3)
-    state = _speak(String, OPERATING_STATE, lambda _: String(data='ENABLED'), RESULT)
+    state = _publish(String, OPERATING_STATE, lambda _: String(data='ENABLED'), RESULT)
     state.inject(rig)
 
 
@@ -256,9 +256,9 @@ def _come_late(rig: ProcessRig) -> None:
     rig.operator.late_ns = 0
 
 
-def _rivals() -> dict[str, ProcessFault]:
+def _competing_publishers() -> dict[str, ProcessFault]:
     commands = {
-        topic: _speak(JointState, topic, partial(_command, names), qos)
+        topic: _publish(JointState, topic, partial(_command, names), qos)
         for topic, names, qos in (
             (SLAVE_COMMAND, JOINTS, COMMAND),
             (CORRECTION, JOINTS, COMMAND),
@@ -268,12 +268,15 @@ def _rivals() -> dict[str, ProcessFault]:
         )
     }
     others = {
-        OPERATING_STATE: _speak(String, OPERATING_STATE, lambda _: String(data='ENABLED'), RESULT),
-        MOTION_SESSION: _speak(Header, MOTION_SESSION, lambda _: Header(frame_id='x-1'), EVENT),
-        CALIBRATION_RESULT: _speak(DiagnosticArray, CALIBRATION_RESULT, _result, RESULT),
-        MASTER_CLUTCH: _speak(Joy, MASTER_CLUTCH, _clutch, EVENT),
+        OPERATING_STATE: _publish(
+            String, OPERATING_STATE, lambda _: String(data='ENABLED'), RESULT
+        ),
+        MOTION_SESSION: _publish(Header, MOTION_SESSION, lambda _: Header(frame_id='x-1'), EVENT),
+        CALIBRATION_RESULT: _publish(DiagnosticArray, CALIBRATION_RESULT, _result, RESULT),
+        MASTER_CLUTCH: _publish(Joy, MASTER_CLUTCH, _clutch, EVENT),
     }
-    return {f'rival on {topic}': fault for topic, fault in (commands | others).items()}
+    faults = commands | others
+    return {f'competing publisher on {topic}': fault for topic, fault in faults.items()}
 
 
 def _of_process(name: str) -> dict[str, ProcessFault]:
@@ -286,15 +289,15 @@ def _of_process(name: str) -> dict[str, ProcessFault]:
 
 _ANYWHERE: dict[str, ProcessFault] = {
     'nothing': ProcessFault(lambda rig: rig.operator.serve(3.0)),
-    **_rivals(),
-    'a rival sends ENABLED while DISABLED': ProcessFault(_speak_while_disabled),
+    **_competing_publishers(),
+    'competing publisher sends ENABLED while DISABLED': ProcessFault(_publish_while_disabled),
     'clutch released and pressed within 0.6 s': ProcessFault(_clutch_again, pauses=True),
     'handle and clutch silent for up to 0.6 s': ProcessFault(_fall_silent, pauses=True),
     'old commands sent again, outside program': ProcessFault(_replay, 'outside'),
     'commands 0.12 to 0.5 s late, outside program': ProcessFault(_come_late, 'outside'),
 }
 COMPOSED_FAULTS: Mapping[str, ProcessFault] = _ANYWHERE | _of_process(GRAPH)
-"""Where all nodes share a process."""
+"""Faults of a graph in one process."""
 
 PROCESS_FAULTS: Mapping[str, ProcessFault] = (
     _ANYWHERE
@@ -315,4 +318,4 @@ PROCESS_FAULTS: Mapping[str, ProcessFault] = (
         ),
     }
 )
-"""Where each node is a process."""
+"""Faults of a graph with one process for each node."""

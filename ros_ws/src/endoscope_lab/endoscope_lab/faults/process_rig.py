@@ -1,4 +1,4 @@
-"""The running graph as processes with an operator: enabled, moved, broken, enabled again."""
+"""The running graph as processes with an operator: enabled, moved, faulted, enabled again."""
 
 import time
 from pathlib import Path
@@ -15,12 +15,12 @@ _MOVED_RAD = 0.02
 
 
 class ProcessRig(ClosedOnExit):
-    """The nodes in processes of their own, or all of them in one.
+    """The nodes in processes of their own, or all in one.
 
-    `rate`: beats per second.
-    `composed`: whether all nodes live in one process.
+    `rate`: ticks per second.
+    `composed`: whether all nodes run in one process.
     `folder`: for bags and logs.
-    `random`: for whatever is left to chance.
+    `random`: source of all random draws.
     """
 
     def __init__(self, rate: int, composed: bool, folder: Path, random: Random) -> None:
@@ -38,7 +38,7 @@ class ProcessRig(ClosedOnExit):
         self.begin('master')
 
     def begin(self, source: str) -> None:
-        """Have the graph run with a source of its motion; see `ProcessFault`."""
+        """Run the graph with a source of motion; see `ProcessFault`."""
         of_master = {'outside': 'none'}.get(source, source)
         holder = GRAPH if GRAPH in self.names else 'master'
         if of_master != self._source or source == 'motion':
@@ -52,13 +52,13 @@ class ProcessRig(ClosedOnExit):
             self.operator.let_go_and_press()
 
     def revive(self) -> None:
-        """Start what does not run, and wait until every node is heard."""
+        """Start the processes that do not run, and wait until every node publishes."""
         for name in self.names:
             if name not in self.processes.running:
                 self.start(name)
         if not self.operator.serve(PATIENCE_S, self._all_heard):
             silent = sorted(set(NODES) - set(self.operator.graph.heard_ns))
-            raise RuntimeError(f'not heard of: {", ".join(silent)}')
+            raise RuntimeError(f'silent nodes: {", ".join(silent)}')
 
     def _all_heard(self) -> bool:
         return set(self.operator.graph.heard_ns) >= set(NODES)
@@ -69,7 +69,7 @@ class ProcessRig(ClosedOnExit):
         if name in ('master', GRAPH):
             parameters.setdefault('master', {})['source'] = self._source
         if name in ('controller', GRAPH):
-            # What feedback adds to a motion would hide what a fault adds.
+            # Corrections of feedback would hide those of a fault.
             parameters.setdefault('controller', {})['active'] = False
         if name in ('recorder', GRAPH):
             self._bags += 1
@@ -83,7 +83,7 @@ class ProcessRig(ClosedOnExit):
         self._forget(name)
 
     def kill_all(self) -> None:
-        """Have the next :meth:`begin` start everything again."""
+        """Kill all processes, so that the next :meth:`begin` starts them again."""
         for name in self.processes.running:
             self.kill(name)
 
@@ -97,7 +97,7 @@ class ProcessRig(ClosedOnExit):
             self.operator.graph.heard_ns.pop(node, None)
 
     def enable_and_move(self) -> float | None:
-        """Enable until the shafts move; seconds that it took, None if they do not."""
+        """Enable until the shafts move; time in s that it took, None if they do not."""
         operator = self.operator
         began = time.monotonic()
         rest = operator.shafts[-1].position if operator.shafts else (0.0, 0.0)

@@ -1,4 +1,4 @@
-"""What shafts and goals did around a fault, judged by their stamps."""
+"""Motion of shafts and goals around a fault, by their stamps."""
 
 import itertools
 from collections.abc import Sequence
@@ -10,12 +10,12 @@ from endoscope_core.rig import MotorFacts
 from endoscope_nodes.runtime.streams import JointSample
 
 STILL = 2.0 * 2.0 * np.pi / 4096
-"""Two counts of the encoder, in rad: what readings of a shaft at rest may differ by."""
+"""Two counts of the encoder, in rad: largest difference of readings of a shaft at rest."""
 
 HELD_S = 0.2 + 0.1
-"""From silence to the order to hold, and to a servo of the nominal plant that stands.
+"""From silence to the hold command, and to standstill of a servo of the nominal plant.
 
-It is told to hold a pose that was measured while it ran, overshoots it and comes back.
+The servo holds a pose that was measured in motion, so that it overshoots and returns.
 """
 
 # The slowest motion of the bench leaves STILL within this, its reversals included.
@@ -25,7 +25,7 @@ _SPEED_NS = 10_000_000
 
 
 def goal_step(goals: Sequence[JointSample], motors: MotorFacts) -> tuple[float, float]:
-    """Largest step in rad of goals, in stamp order, in a session; and largest over its bound."""
+    """Largest step of goals within a session, in rad, and as a share of its bound."""
     largest, share = 0.0, 0.0
     for before, after in itertools.pairwise(goals):
         period = after.stamp_ns - before.stamp_ns
@@ -33,7 +33,7 @@ def goal_step(goals: Sequence[JointSample], motors: MotorFacts) -> tuple[float, 
             continue
         step = max(abs(a - b) for a, b in zip(after.position, before.position, strict=True))
         largest = max(largest, step)
-        # A step is bounded by the motors' speed times the time between the stamps.
+        # The bound is the motors' speed times the time between the stamps.
         share = max(share, step / (motors.speed * period * 1e-9))
     return largest, share
 
@@ -67,16 +67,16 @@ class ShaftTrace:
         if not len(inside):
             return 0.0
         ends = ends[inside]
-        way = np.abs(self._angles[ends] - self._angles[inside]).max(axis=1)
+        travel = np.abs(self._angles[ends] - self._angles[inside]).max(axis=1)
         took = (self._stamps[ends] - self._stamps[inside]) * 1e-9
-        return float((way / took).max())
+        return float((travel / took).max())
 
     def standstill(self, since_ns: int, open_ns: int, until_ns: int) -> tuple[float | None, float]:
-        """When in s the shafts came to rest (None: never), and how far in rad they went unasked."""
-        # The stamps are those of the fault, of the last word that a session was open, and of the
-        # next enable. Rest begins with the first reading from which on the shafts stayed for 0.3 s.
-        # The way is the largest until the enable once they had come to rest and no session had been
-        # open for `HELD_S`.
+        """Time in s to standstill (None: never), and travel in rad without an open session."""
+        # The stamps are those of the fault, of the last message of an open session, and of the next
+        # enable. Standstill starts with the first reading after which the shafts stay for 0.3 s.
+        # The travel is the largest before the enable, from standstill on and once no session has
+        # been open for `HELD_S`.
         inside = (self._stamps >= since_ns) & (self._stamps < until_ns)
         stamps, angles = self._stamps[inside], self._angles[inside]
         ends = np.searchsorted(stamps, stamps + _WINDOW_NS)
@@ -84,7 +84,7 @@ class ShaftTrace:
             if end >= len(stamps):
                 break
             if np.abs(angles[k:end] - angles[k]).max() <= STILL:
-                # Within an open session a hand that was not heard for a while may go on.
+                # Within an open session a hand may continue after a silence.
                 closed = max(k, int(np.searchsorted(stamps, open_ns + HELD_S * 1e9)))
                 gone = np.abs(angles[closed:] - angles[closed : closed + 1]).max(initial=0.0)
                 return float(stamps[k] - since_ns) * 1e-9, float(gone)

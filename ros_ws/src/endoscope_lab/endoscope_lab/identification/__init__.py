@@ -1,1 +1,1 @@
-"""The rig identified from recordings of its tubes, and a parameter set for each class."""
+"""Identification of a rig from recordings in its tubes, and of a parameter set for each class."""

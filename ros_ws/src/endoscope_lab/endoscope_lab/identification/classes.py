@@ -1,4 +1,4 @@
-"""A parameter set for each hysteresis class, made from a data set."""
+"""A parameter set for each hysteresis class, fitted to a data set."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -26,12 +26,12 @@ _SAMPLE_STEP = 10
 
 @dataclass(frozen=True)
 class ClassIdentification:
-    """What has been identified for one class."""
+    """Parameters identified for one class."""
 
     class_deg: int
-    feedforward: LawParameters  # what the compensator works with
-    model: LawParameters  # what was fitted; the same for the plant
-    rmse: float  # that the model leaves of the recordings, rad, or N for the plant
+    feedforward: LawParameters  # for the compensator
+    model: LawParameters  # as fitted; the same for the plant
+    rmse: float  # of the model on the recordings, rad, or N for the plant
 
 
 def identify_classes(
@@ -44,8 +44,8 @@ def identify_classes(
 ) -> list[ClassIdentification]:
     """Model and feed-forward of every class, from all its recordings and both joints at once.
 
-    `lead` in s is the compensator's, `model` one of `KINDS`; no more than `recordings_per_class`
-    are used, and `progress` is called with a line for each class.
+    `lead` in s is that of the compensator, `model` one of `KINDS`. At most `recordings_per_class`
+    are used; `progress` is called with a line for each class.
     """
     if model not in KINDS:
         raise InputError(f'unknown model {model!r}: choose one of {", ".join(KINDS)}')
@@ -117,7 +117,7 @@ def class_parameter_sets(
     lead: float,
     model: str = 'bouc_wen',
 ) -> dict[str, object]:
-    """The content of a parameter file for a lead (s), with the command that made it."""
+    """Content of a parameter file for a lead (s), with the command that made it."""
     return {
         'schema': 1,
         'model': model,

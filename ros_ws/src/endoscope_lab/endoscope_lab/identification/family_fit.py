@@ -22,7 +22,7 @@ from endoscope_core.rig import shipped_rig
 Array = NDArray[np.float64]
 
 LUMPED = (0.0, 5.0, 0.0, 3.0)
-"""A friction profile with all of it at the wire's ends: the lumped capstan plant."""
+"""Friction profile with all friction at the wire's ends: the lumped capstan plant."""
 
 PRIORS: Mapping[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
     'capstan_exponent': ((0.95, 0.35), (0.4, 0.3)),
@@ -44,19 +44,19 @@ PRIORS: Mapping[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
     'load_cell_delay': ((0.07,), (0.03,)),
     'tracker_delay': ((0.0125,), (0.003,)),
 }
-"""What is fitted: where the search begins, in the numbers of a family, and how far off each may be
-(of positive keys: of the logarithm). Servo and delays hold what is known of the recordings:
-the load cells' filter and period take 46 ms and, on average, 25 ms, and what else a reading waits
-for is not known; the tracker holds for 25 ms."""
+"""Fitted parameters: start of the search, in the numbers of a family, and prior tolerance (for
+positive keys, of the logarithm). Servo and delays have what is known of the recordings: filter and
+period of the load cells take 46 ms and, on average, 25 ms, besides an unknown delay; the tracker
+holds for 25 ms."""
 FITTED_CYCLES = 1.3
-"""A cycle from rest never shows the rise from the other side, on which friction that grows with the
-bend, and what imitates it, differ."""
+"""More than one cycle, since a cycle from rest lacks the rise from the other side, which
+distinguishes friction that grows with the bend from its imitations."""
 ANGLE_SCALE = math.radians(1.0)
 TENSION_SCALE = 0.27
 LEAST_SCALE, MOST_SCALE = 0.06, 0.18
-"""What angle, tension and its extremes may be off: a plant without effects leaves so much."""
+"""Scales of the errors of angle, tension and its extremes: residuals of a plant without effects."""
 _WORTH = 60.0
-"""Independent readings in a cycle: what is left is smooth over a tenth of a second."""
+"""Independent readings in a cycle: the residual is smooth over a tenth of a second."""
 _SCORED_EVERY = 2
 _REACH = 4.0
 _STEP = 0.03
@@ -90,12 +90,12 @@ class TubeRecording:
 
     @property
     def fitted(self) -> slice:
-        """Samples that a family is fitted on: both branches of the loop."""
+        """Samples for the fit of a family: both branches of the loop."""
         return slice(0, round(FITTED_CYCLES * self.cycles[1]))
 
     @property
     def judged(self) -> slice:
-        """Samples after those, to the end of the last cycle."""
+        """Samples after the fitted ones, to the end of the last cycle."""
         return slice(self.fitted.stop, self.cycles[-1])
 
     def until(self, sample: int) -> TubeRecording:
@@ -113,7 +113,7 @@ class TubeRecording:
 
 @dataclass(frozen=True)
 class TubeFigures:
-    """What a loop shows: rad and N; extremes of tension (2,) are of the two wires."""
+    """Figures of a loop, in rad and N; extremes of tension (2,) are those of the two wires."""
 
     loop_width: float
     rmse: float
@@ -137,7 +137,7 @@ def figures(desired: Array, angle: Array, tension: Array) -> TubeFigures:
 
 @dataclass(frozen=True)
 class Misfit:
-    """RMS left: angle in rad, tensions (2,) in N."""
+    """Rms residuals: angle in rad, tensions (2,) in N."""
 
     angle: float
     tension: Array
@@ -147,7 +147,7 @@ def read(family: TubeFamily, bend: float, desired: Array, tick: float) -> tuple[
     """Angle (N,) in rad and tensions (N, 2) in N that the recorded rig would have read.
 
     `bend` is the tube's in rad, `desired` (N,) the commanded bending angle in rad, `tick` in s. The
-    angle counts from where the joint was at the start.
+    angle is relative to that at the start.
     """
     plant = PlantDescription(joints={_JOINT: family.joint(bend)})
     made = simulate(plant, (shipped_rig().joints.gear * desired)[:, None], tick)
@@ -162,7 +162,7 @@ def read(family: TubeFamily, bend: float, desired: Array, tick: float) -> tuple[
 
 
 def misfit(family: TubeFamily, recording: TubeRecording, part: slice) -> Misfit:
-    """What a family leaves of some samples of a recording."""
+    """Residuals of a family on some samples of a recording."""
     angle, tension = read(family, recording.bend, recording.desired, recording.tick)
     return Misfit(
         float(np.sqrt(np.mean((angle - recording.angle)[part] ** 2))),
@@ -180,18 +180,18 @@ def fit_family(
     """Fit a family to all samples of all recordings at once.
 
     Bounded trust-region least squares (Branch, Coleman and Li 1999), with a Gaussian prior on every
-    number: tubes that are alike cannot tell a wire's stiffness from its joint's, and a line through
-    five tubes should say something of those between. Differences for its slopes are taken over a
-    few hundredths of a prior, since the plant has a kink where a wire becomes slack; for the same
-    reason the search is begun again, `starts` times in all, from places near the best. Keys without
-    a prior are nominal; a friction profile that is given is held instead of fitted.
+    number: in similar tubes the stiffness of a wire is confounded with that of its joint, and a
+    line through five tubes should hold for the tubes between. Finite differences span a few
+    hundredths of a prior, since the plant has a kink where a wire becomes slack; for the same
+    reason the search restarts, `starts` times in all, near the best point so far. Keys without a
+    prior are nominal; a given friction profile is held instead of fitted.
     """
     _check(recordings)
     free = {k: v for k, v in priors.items() if friction_profile is None or k != 'friction_profile'}
     begin = np.concatenate([_unknowns(key, line) for key, (line, _) in free.items()])
     spread = np.concatenate([np.array(widths, dtype=float) for _, widths in free.values()])
     high = np.full(len(begin), _REACH)
-    # A load cell shows no less than its offset, which the least tension therefore bounds.
+    # A load cell reads at least its offset, which the least tension therefore bounds.
     if 'load_cell_offset' in free:
         least = np.min([recording.tension.min(axis=0) for recording in recordings], axis=0)
         at = _places(free)['load_cell_offset']
@@ -293,7 +293,7 @@ def _check(recordings: Sequence[TubeRecording]) -> None:
 
 
 def tube_recordings(folder: Path) -> list[TubeRecording]:
-    """Two cycles in real time of each tube of a folder, from its `BEND.txt` (deg), by bend."""
+    """Read two cycles in real time of each tube of a folder from `BEND.txt` (deg), by bend."""
     found = []
     for path in folder.glob('[0-9]*.txt'):
         table = np.loadtxt(path, delimiter=',')

@@ -1,4 +1,4 @@
-"""The rig identified from recordings of its tubes: fit and table."""
+"""Identification of a rig from recordings in its tubes: fit and table."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _RAD = np.pi / 180.0
 
 @dataclass(frozen=True)
 class IdentifiedFamily:
-    """A family, and the lumped plant fitted likewise."""
+    """A family, and a lumped plant fitted in the same way."""
 
     family: TubeFamily
     lumped: TubeFamily
@@ -49,13 +49,13 @@ def identified(
     recordings: Sequence[TubeRecording],
     seed: int,
     command: str,
-    say: Callable[[str], None],
+    report: Callable[[str], None],
 ) -> IdentifiedFamily:
-    """Fit family and lumped plant to the first 1.3 cycles."""
+    """Fit a family and a lumped plant to the first 1.3 cycles."""
     first = [recording.until(recording.fitted.stop) for recording in recordings]
-    say(f'{len(first)} tubes: the family')
+    report(f'{len(first)} tubes: the family')
     family = fit_family(first, seed=seed)
-    say('friction lumped at the ends')
+    report('friction lumped at the ends')
     lumped = fit_family(first, friction_profile=LUMPED, seed=seed)
     left: dict[str, Any] = {
         f'{_bend(recording)} deg': [
@@ -77,7 +77,7 @@ def identified(
 
 
 def table(recordings: Sequence[TubeRecording], found: IdentifiedFamily) -> str:
-    """What is left of each tube, and its figures simulated beside recorded."""
+    """Residuals of each tube, and its figures, simulated over recorded."""
     lines = [LEFT]
     for recording in recordings:
         plants = []
@@ -115,10 +115,10 @@ def table(recordings: Sequence[TubeRecording], found: IdentifiedFamily) -> str:
 
 
 def settled(recording: TubeRecording, number: int) -> slice:
-    """A whole loop: the second cycle, or as much from the end of the first quarter."""
+    """A whole loop: the second cycle, or one cycle from the end of the first quarter."""
     if number > 1:
         return recording.cycle(number)
-    # The first quarter of a recording starts from rest and is on no loop.
+    # The first quarter of a recording starts from rest and is not on the loop.
     quarter = recording.cycles[1] // 4
     return slice(quarter, recording.cycles[1] + quarter)
 

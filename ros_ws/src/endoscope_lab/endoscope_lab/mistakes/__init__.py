@@ -1,1 +1,1 @@
-"""Recordings in which people took something wrongly, and right ones."""
+"""Recordings with injected mistakes of units, signs and signals, and correct ones."""

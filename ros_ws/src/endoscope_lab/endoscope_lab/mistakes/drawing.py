@@ -1,4 +1,4 @@
-"""Rigs with other numbers than described and some physics more, and what they record."""
+"""Recordings of rigs whose parameters and effects differ from the description."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -22,7 +22,7 @@ Generator = np.random.Generator
 
 TRACKER_EVERY = 25
 MOST_BENDING_RAD = 2.5
-"""Beyond which the section would be torn."""
+"""Largest bending angle that the section survives."""
 SCATTERED = (
     'pretension',
     'wire_stiffness',
@@ -38,9 +38,9 @@ SCATTERED = (
 def draw_rig(
     rng: Generator, joints: Sequence[str], spread: float, strength: float, effects: int
 ) -> PlantDescription:
-    """A rig of the family of tubes with other numbers and some effects of the catalogue."""
-    # Numbers are scattered by `spread` (rms of the logarithm). Each effect's parameters lie between
-    # their typical value, at a `strength` of 0, and their bound, at 1.
+    """A rig of the family of tubes with scattered parameters and some effects of the catalogue."""
+    # Parameters scatter by `spread` (rms of the logarithm). Those of each effect lie between their
+    # typical value, at a `strength` of 0, and their bound, at 1.
     drawn = {}
     for joint in joints:
         tube = shipped_family().joint(rng.uniform(0.0, MOST_BENT))
@@ -87,7 +87,7 @@ def draw_motion(rng: Generator, joints: Sequence[str]) -> tuple[Array, Array]:
         at = np.arange(0.0, motion.duration, TICK)
         angle = np.array(motion.sample(at)[0])
         if kind == 'calibration':
-            # Moved alike, two joints could not be told apart.
+            # Two joints with the same motion would be indistinguishable.
             angle[:, 1] = 0.7 * np.interp(np.maximum(at - 2.0, 0.0), at, angle[:, 0])
     return at, angle[:, : len(joints)] * shipped_rig().joints.gear
 
@@ -95,7 +95,7 @@ def draw_motion(rng: Generator, joints: Sequence[str]) -> tuple[Array, Array]:
 def read(
     plant: PlantDescription, at: Array, command: Array, seed: int, noisy: bool = True
 ) -> tuple[Recording, bool]:
-    """What the sensors of a rig record, and whether it survives that."""
+    """Recording of a rig by its sensors, and whether the rig survives the motion."""
     truth = simulate(plant, command)
     sensors = SensorModel(plant.sensors, seed)
 
@@ -133,31 +133,31 @@ def draw_recording(
     effects: int,
     noisy: bool = True,
 ) -> tuple[Recording, PlantDescription]:
-    """A recording of a rig that survives it, and its plant."""
+    """A recording of a rig that survives its motion, and the plant of the rig."""
     while True:
         plant = draw_rig(rng, joints, spread, strength, effects)
         at, command = draw_motion(rng, joints)
         try:
             recording, survives = read(plant, at, command, int(rng.integers(2**31)), noisy)
         except ValueError:
-            # An effect may be invalid at a bound beside another one's.
+            # An effect at a bound may be invalid in combination with another one.
             continue
         if survives:
             return recording, plant
 
 
 def described(recording: Recording) -> PlantDescription:
-    """The plant that is described to the audit: the nominal one."""
+    """The nominal plant, as described to the audit."""
     return PlantDescription(joints={joint: JointParameters() for joint in recording.joints})
 
 
 def names_of(rng: Generator, count: int = 1) -> tuple[str, ...]:
-    """Names of one or two joints, of `count` at least."""
+    """Names of one or two joints, at least `count`."""
     return ('bend_x', 'bend_y')[: max(count, int(rng.integers(1, 3)))]
 
 
 def sound_recording(seed: int) -> Recording:
-    """A recording of a rig with one or two effects of up to their bounds; one in ten noiseless."""
+    """A recording of a rig with one or two effects up to their bounds; one in ten without noise."""
     rng = np.random.default_rng(seed)
     noisy = bool(rng.random() < 0.9)
     return draw_recording(rng, names_of(rng), 0.3, 1.0, int(rng.integers(1, 3)), noisy)[0]

@@ -1,4 +1,4 @@
-"""`endoscope bench mistakes`: whether mistakes of people are reported, and nothing else."""
+"""`endoscope bench mistakes`: whether the audit reports mistakes of people, and nothing else."""
 
 import argparse
 import time
@@ -21,7 +21,7 @@ from endoscope_lab.mistakes.drawing import (
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print what was not reported correctly and a table; return 0."""
+    """Print the cases that were not reported correctly and a table; return 0."""
     cases = [(name, seed) for name in MISTAKES for seed in args.seeds]
     cases += [('', seed) for seed in args.sound]
     rows = []
@@ -29,7 +29,9 @@ def run(args: argparse.Namespace) -> int:
         for row in pool.map(audited, *zip(*cases, strict=True)):
             rows.append(row)
             if not row.right:
-                print(f'{row.name or "no mistake"}, seed {row.seed}: {"; ".join(row.said) or "-"}')
+                print(
+                    f'{row.name or "no mistake"}, seed {row.seed}: {"; ".join(row.findings) or "-"}'
+                )
     wrong = [row for row in rows if row.name]
     sound = [row for row in rows if not row.name]
     right = sum(row.right for row in wrong)
@@ -51,23 +53,23 @@ def run(args: argparse.Namespace) -> int:
 
 Change = Callable[[Recording, Generator], Recording]
 Columns = Callable[[Generator, int], list[int]]
-Said = tuple[tuple[str, str, str], ...]
+Expected = tuple[tuple[str, str, str], ...]
+"""Id, topic and words of each finding."""
 
 
 @dataclass(frozen=True)
 class Mistake:
-    """What was done to a recording, and what the audit may say of it."""
+    """A change of a recording, and the findings that report it."""
 
-    change: Change  # from a recording and a random generator to it as it was mistaken
-    # Id, topic and words of each finding; any one of the tuples will do.
-    said: tuple[Said, ...]
-    joints: int = 1  # how many the recording must have
+    change: Change  # from a correct recording and a random generator to the mistaken recording
+    expected: tuple[Expected, ...]  # alternatives, of which one must be found
+    joints: int = 1  # number of joints that the recording must have
 
 
 def scaled(
     quantity: str, factor: float | Callable[[Generator], float], columns: Columns | None = None
 ) -> Change:
-    """Give a quantity, or some of its columns, in another unit."""
+    """Scale a quantity, or some of its columns, to another unit."""
 
     def change(recording: Recording, rng: Generator) -> Recording:
         series = getattr(recording, quantity)
@@ -94,7 +96,7 @@ def ordered(order: tuple[int, ...], *quantities: str) -> Change:
 
 
 def stamped(factor: float, *topics: str) -> Change:
-    """Give stamps, of some topics or of all, in another unit."""
+    """Scale the stamps of some topics, or of all, to another unit."""
 
     def change(recording: Recording, _: Generator) -> Recording:
         every = {'command': recording.command, **recording.measured()}
@@ -144,13 +146,13 @@ GRAVITY = 9.80665
 MOTOR_QUANTITIES = ('shaft_position', 'shaft_velocity', 'shaft_effort')
 
 
-def unit(topic: str, words: str) -> Said:
-    """What is said of a wrong unit."""
+def unit(topic: str, words: str) -> Expected:
+    """The finding of a wrong unit."""
     return (('wrong_unit', topic, words),)
 
 
-def of_gear(words: str) -> tuple[Said, ...]:
-    """The command's gear, or the shaft's: what differs is the same."""
+def of_gear(words: str) -> tuple[Expected, ...]:
+    """Findings of a wrong gear, of the command or of the shaft: the recording is the same."""
     return (unit(COMMAND, words), (('wrong_gear', MOTOR, 'times as far as commanded'),))
 
 
@@ -221,10 +223,10 @@ MISTAKES = {
 }
 
 
-def is_said(mistake: Mistake, report: AuditReport) -> bool:
-    """Whether a report says all that is wrong, and nothing else but notes."""
+def is_reported(mistake: Mistake, report: AuditReport) -> bool:
+    """Whether a report has all findings of a mistake, and no others but notes."""
     found = [(f.id, f.signals[0].partition(':')[0], f.text) for f in report.faults()]
-    for wanted in mistake.said:
+    for wanted in mistake.expected:
         left = list(found)
         for identity, topic, words in wanted:
             match = [f for f in left if f[:2] == (identity, topic) and words in f[2]]
@@ -239,19 +241,19 @@ def is_said(mistake: Mistake, report: AuditReport) -> bool:
 
 @dataclass(frozen=True)
 class Row:
-    """What was said."""
+    """The audit of one recording."""
 
-    name: str  # of the mistake; empty where none was made
+    name: str  # of the mistake; empty for a correct recording
     seed: int
-    # The mistake and nothing else was said, or nothing where none was made.
+    # The mistake and nothing else was reported, or nothing for a correct recording.
     right: bool
-    mistaken: bool  # whether any mistake was said
+    mistaken: bool  # whether any mistake was reported
     seconds: float
-    said: tuple[str, ...]
+    findings: tuple[str, ...]
 
 
 def audited(name: str, seed: int) -> Row:
-    """Audit the recording of a seed with a mistake; without, where it has no name."""
+    """Audit the recording of a seed with a mistake, or without one if the name is empty."""
     mistake = MISTAKES.get(name)
     if mistake is None:
         recording = sound_recording(seed)
@@ -264,6 +266,6 @@ def audited(name: str, seed: int) -> Row:
     report = audit_recording(recording, described(recording))
     seconds = time.perf_counter() - begun
     mistaken = bool(report.mistakes())
-    right = is_said(mistake, report) if mistake else not mistaken
-    said = tuple(f.text for f in report.faults())
-    return Row(name, seed, right, mistaken, seconds, said)
+    right = is_reported(mistake, report) if mistake else not mistaken
+    findings = tuple(f.text for f in report.faults())
+    return Row(name, seed, right, mistaken, seconds, findings)

@@ -1,1 +1,1 @@
-"""The papers' tables and figures beside ours."""
+"""Tables and figures of the two papers, compared with ours."""

@@ -1,4 +1,4 @@
-"""How a calibration fares with load cells as they are, and as slowly as a line reads them."""
+"""Calibrations with imperfect load cells, and with cells that are read slowly."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ FAULTS: dict[str, Callable[[NDArray[np.float32], Generator], NDArray[np.float32]
     },
     'exchanged across joints': exchanged_across_joints,
 }
-"""What is done to one recording (N, 4), to be refused or harmless."""
+"""Faults of one recording (N, 4), which must be refused or harmless."""
 _CELLS: dict[str, dict] = (
     {f'good, read at {1000 // period} Hz': {'period': period} for period in (1, 5, 10)}
     | {f'zero errors of {zero} N (sd)': {'zero': zero} for zero in (0.02, 0.05, 0.1, 0.2, 0.5)}
@@ -77,7 +77,7 @@ def load_cells_text(settings: PapersBench) -> Iterator[str]:
     """A line for each kind of cells: right, wrong and refused by the class nearest to the size."""
     motion = settings.motion
     classifier = load_classifier(settings.weights, motion)
-    # Of random instruments, which trained nothing, with a size to 1 deg of a class.
+    # Random instruments that were not used in training, with a size within 1 deg of a class.
     tubes = _tubes(
         (
             (
@@ -94,7 +94,7 @@ def load_cells_text(settings: PapersBench) -> Iterator[str]:
     for name, case in _CELLS.items():
         yield f'{name:36s} {_as_read(classifier, tubes, settings.seed, **case)}'
     for deg in (30.0, 120.0):
-        # Rigs of wide spreads with a size that those of the project hardly have.
+        # Rigs of wide spreads, with a size that rigs of the project hardly have.
         ends = (float(np.deg2rad(deg - 2.0)), float(np.deg2rad(deg + 2.0)))
         begin = first(motion)
         rigs = training_rigs(_NEVER_SEEN + settings.seed, settings.tubes, motion, begin, sizes=ends)
@@ -133,7 +133,7 @@ def reading_rates_text(settings: PapersBench) -> Iterator[str]:
 
 
 def tubes_of_classes(seed: int, each: int, motion: CalibrationMotion) -> Tubes:
-    """Tubes that no data set holds, the same ones for every motion."""
+    """Tubes that are in no data set, the same ones for every motion."""
     drawn = (
         (np.random.default_rng([_UNSEEN, seed, deg, number]), np.deg2rad(deg))
         for deg in CLASSES_DEG
@@ -162,7 +162,7 @@ def _as_read(
     gain: float = 0.0,
     fault: str = '',
 ) -> str:
-    """Judge tubes as cells `read` them, with its period, zero and gain."""
+    """Classify tubes from readings with a period, zero and gain as in `read`."""
     generator = np.random.default_rng([_NEVER_SEEN, seed, period])
     results: list[ClassificationResult] = []
     refused: list[bool] = []
@@ -198,11 +198,11 @@ def judged_at_rate(
     delay: float = 0.0,
     kind: str = '',
 ) -> ClassificationResult | None:
-    """Read tube `k` at a rate of readings a second, resample and judge it; None where refused.
+    """Read tube `k` at a rate of readings per second, resample and classify; None where refused.
 
-    Each comes up to `JITTER` of the interval early or late, and is older than its stamp by `delay`
-    s. There are none for `gap` s where the tension bends most; however long, that is bridged. A
-    kind of `STRANGE` spoils them first.
+    Each reading comes up to `JITTER` of the interval early or late, and is older than its stamp by
+    `delay` s. Readings are missing for `gap` s where the tension curves most; a gap of any length
+    is bridged. A kind of `STRANGE` spoils the recording first.
     """
     generator = np.random.default_rng([_UNSEEN, seed, round(rate)])
     motion, tension = calibration_motion(classifier.motion), tubes.tension[k]
@@ -229,7 +229,7 @@ def judged_at_rate(
 
 
 def _most_bent(tension: Array, begin: int, gap: int) -> int:
-    """Where in ns a straight line over a gap of samples misses the most of the tension."""
+    """Time in ns at which a straight line over a gap of samples misses the tension most."""
     starts = np.arange(begin, len(tension) - gap)
     middle = tension[starts + gap // 2]
     missed = np.abs(middle - 0.5 * (tension[starts] + tension[starts + gap])) / (middle + 0.5)

@@ -1,4 +1,4 @@
-"""Tables of classes, backlash sizes and reach, as a calibration tells them from the wires."""
+"""Tables of classes, backlash sizes and reach, as a calibration identifies them from tensions."""
 
 import time
 from collections.abc import Sequence
@@ -41,12 +41,12 @@ _MOST_INSTRUMENTS = 300
 
 
 def tension_by_shape_rows(settings: PapersBench) -> list[Row]:
-    """Simulate `tubes` shapes of each case: one rig, its bends spread otherwise, of equal size."""
+    """Simulate `tubes` shapes of each case: one rig of one size, with bends spread differently."""
     generator = np.random.default_rng([settings.seed, 1])
     spread = np.linspace(-GREATEST_UNEVENNESS, GREATEST_UNEVENNESS, settings.tubes).tolist()
 
     def shapes_of(size: float) -> list[TubeConfiguration]:
-        """Of the first instrument drawn that has this size in every shape."""
+        """Shapes of the first drawn instrument that has this size in every shape."""
         for _ in range(_MOST_INSTRUMENTS):
             instrument = random_instrument(generator)
             shapes = []
@@ -78,7 +78,7 @@ def tension_by_shape_rows(settings: PapersBench) -> list[Row]:
             f'{size_deg:g} deg, among like shapes',
             [rmse(a, b) for a, b in combinations(shapes, 2)],
             paper,
-            note='The same instrument in tubes whose bends are spread otherwise, simulated.',
+            note='The same instrument in tubes whose bends are spread differently, simulated.',
         )
         for (size_deg, paper), shapes in zip(_CASES, tensions, strict=True)
     ]
@@ -98,13 +98,13 @@ _ASKED = {
     'pretension set anew': (True, True),
     'another instrument each': (False, False),
 }
-"""What a network is asked, and whether recordings are of one instrument and its pretension is set
-for each: the paper has one instrument, mounted once."""
+"""Data sets by name: whether recordings are of one instrument, and whether its pretension is set
+for each. The paper has one instrument, mounted once."""
 _INSTRUMENTS = 3
 
 
 def classifiers_rows(settings: PapersBench) -> list[Row]:
-    """Train the paper's network on folds of a data set; judge it by the shipped classifier."""
+    """Train the paper's network on folds of a data set; compare it with the shipped classifier."""
     from endoscope_lab.papers.networks import cross_validate, use_one_thread
 
     use_one_thread()
@@ -127,7 +127,7 @@ def classifiers_rows(settings: PapersBench) -> list[Row]:
 
 
 def _ours(name: str, dataset: CalibrationDataset, settings: PapersBench) -> Row:
-    """The classifier that comes with the project, which was trained on none of the recordings."""
+    """The shipped classifier, which was trained on none of the recordings."""
     settings.report(f'ours, {name}')
     classifier = load_classifier(motion=dataset.motion)
     results = [
@@ -201,8 +201,8 @@ def reach_rows(settings: PapersBench) -> list[Row]:
         found = plants_of_calibration(
             recording.desired_angle, recording.tension, shipped_rig().joints.gear
         )
-        for joint, told in zip(plant.joints.values(), found, strict=True):
-            true, guess = (bending_range(each, LIMITS) for each in (joint, told.joint))
+        for joint, fit in zip(plant.joints.values(), found, strict=True):
+            true, guess = (bending_range(each, LIMITS) for each in (joint, fit.joint))
             errors.append(100.0 * abs((guess.high - guess.low) / (true.high - true.low) - 1.0))
         settings.report(f'reach: tube {number + 1} of {_TUBES}')
     return [
@@ -212,9 +212,9 @@ def reach_rows(settings: PapersBench) -> list[Row]:
 
 
 def calibration_time_rows(settings: PapersBench) -> list[Row]:
-    """Rest, motion and way back as the calibration node commands them, and computing time."""
-    # The motion is in the rig's time; what is computed (class, size and plant) is measured on this
-    # machine, once for each tube.
+    """Rest, motion and return as the calibration node commands them, and computing time."""
+    # Motion in the rig's time; computing class, size and plant is timed on this machine, once for
+    # each tube.
     rest, gear = 0.5, shipped_rig().joints.gear
     found = []
     for name in CALIBRATION_MOTIONS:
@@ -253,7 +253,7 @@ def calibration_time_rows(settings: PapersBench) -> list[Row]:
 
 
 def real_sizes_rows(settings: PapersBench) -> list[Row]:
-    """A line through the others' sizes, and the shipped network; none without recordings."""
+    """A line through the other tubes' sizes, and the shipped network; empty without recordings."""
     recordings = real_recordings()
     if not recordings:
         settings.report('no recordings at hand; set ENDOSCOPE_SHARED')
@@ -274,23 +274,23 @@ def real_sizes_rows(settings: PapersBench) -> list[Row]:
 
 
 def _of_the_network(recordings: Sequence[RealRecording]) -> Row:
-    """The shipped network, which knows 90 deg where these tubes were moved by 60."""
+    """The shipped network, trained on motions of 90 deg, where these tubes moved by 60 deg."""
     classifier, motion = load_classifier(), calibration_motion()
     phase = np.arange(motion.samples) / CALIBRATION_RATE
-    errors, told = [], []
+    errors, notes = [], []
     for recording in recordings:
         wires = [np.interp(phase, recording.phase, wire) for wire in recording.tension.T]
-        # One joint was moved: its two wires stand for those of both.
+        # Only one joint was moved; its two wires are used for both joints.
         judgement = classifier.judged(course(np.stack(2 * wires, axis=1)[None], motion.name))
         true, [size] = np.rad2deg(recording.backlash_size), np.rad2deg(judgement.size)
         errors.append(size - true)
         [reason] = classifier.reasons_to_refuse(judgement)
-        told.append(
+        notes.append(
             f'tube of {recording.bend} deg: {true:.1f} deg, the network {size:.1f} deg'
             f'{", refused: " + reason if reason else ""}'
         )
     return Row(
         'the shipped 1D-CNN, trained on another motion: rms error [deg]',
         [float(np.sqrt(np.mean(np.square(errors))))],
-        note='\n  '.join(told),
+        note='\n  '.join(notes),
     )

@@ -1,4 +1,4 @@
-"""Tables of the error that remains: both papers' schemes, ours, and models on real recordings."""
+"""Tables of remaining errors: schemes of both papers, ours, and models on real recordings."""
 
 from dataclasses import replace
 
@@ -32,14 +32,14 @@ _PAPER = {
     ('transverse', 'periodic'): ('25.95 ± 0.60', '6.99 ± 0.65', '68.48 ± 0.77', '17.05 ± 0.16'),
     ('transverse', 'non_periodic'): ('26.78 ± 0.13', '6.33 ± 0.18', '70.55 ± 0.51', '17.68 ± 0.10'),
 }
-# Under the calibration sinusoid; tubes of the family of these sizes have the paper's backlash under
+# Sizes under the calibration sinusoid, at which tubes of the family have the paper's backlash under
 # `60 sin t`.
 _SIZES_DEG = {'descending': 55.0, 'transverse': 73.0}
 _SCHEMES = ('none', 'Bouc-Wen of the class', 'physical inverse')
 
 
 def colon_shapes_rows(settings: PapersBench) -> list[Row]:
-    """Track both signals uncompensated, as the paper does it, and by the physical inverse."""
+    """Track both signals uncompensated, with the paper's scheme, and with the physical inverse."""
     classifier, choice = load_classifier(), LawChoice(2)
     signals = (periodic_signal(), non_periodic_signal())
     rmse: dict[tuple[str, str, str], list[float]] = {}
@@ -129,7 +129,7 @@ def compensators_rows(settings: PapersBench) -> list[Row]:
                 peaks.setdefault(name, []).append(float(np.rad2deg(trial.peak(*second_cycle))))
                 pulled.setdefault(name, []).append(float(np.max(trial.tension)))
         settings.report(f'compensators: tube {number + 1} of {settings.tubes}')
-    note = f'{refused} refused: the calibration did not say enough.' if refused else ''
+    note = f'{refused} refused: the calibration lacks what the law needs.' if refused else ''
     found = []
     for name, values in sorted(left.items()):
         paper, aim = papers[name]
@@ -149,9 +149,9 @@ _MIDDLE = 0.9
 
 def changing_tube_rows(settings: PapersBench) -> list[Row]:
     """Before the change, in the cycle after it, and in the cycles after that."""
-    # The paper prints its results as figures without a table: there is nothing to put beside ours.
-    # The signal is scaled to 80 % of what the tighter of the two tubes lets the tip reach. The
-    # capstan exponent grows by 40 to 100 % where it is below 0.9, else it falls by 30 to 50 %.
+    # The paper has figures without a table, so that there is nothing to compare. The signal is
+    # scaled to 80 % of the reach in the tighter of the two tubes. The capstan exponent grows by 40
+    # to 100 % if it is below 0.9, else it falls by 30 to 50 %.
     classifier, choice = load_classifier(), LawChoice(2)
     whole = periodic_signal(_CHANGE + 3.2 * _CYCLE)
     spans = {
@@ -206,11 +206,11 @@ def changing_tube_rows(settings: PapersBench) -> list[Row]:
 
 
 _STRAIGHT_DEG = {'bouc_wen': 1.02}
-"""What the straight tube is known to be modelled to."""
+"""Known error of the model of the straight tube, deg."""
 
 
 def real_recordings_rows(settings: PapersBench) -> list[Row]:
-    """Empty, with a line that says why, where the recordings are not there."""
+    """Errors of the models; empty, with a reported line, without the recordings."""
     recordings = real_recordings()
     if not recordings:
         settings.report('real recordings: none found (ENDOSCOPE_SHARED or shared/data/kaist)')

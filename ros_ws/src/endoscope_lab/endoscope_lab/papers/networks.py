@@ -1,4 +1,4 @@
-"""The network of the first paper (Table 3), trained by its recipe (section 3.2)."""
+"""The network of the first paper (Table 3), trained as in its section 3.2."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,10 +15,10 @@ Rows = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class CrossValidation:
-    """Accuracy on recordings whose tube configuration was not trained with."""
+    """Accuracy on recordings of tube configurations that are not in the training set."""
 
     accuracy: tuple[float, ...]  # share of right classes of each fold
-    # (7, 7): rows are true classes, columns named ones, over all folds.
+    # (7, 7): rows are true classes, columns predicted ones, over all folds.
     confusion: NDArray[np.int64]
 
     @classmethod
@@ -28,7 +28,7 @@ class CrossValidation:
         named_deg: NDArray[np.int64],
         folds: Sequence[tuple[Rows, Rows]],
     ) -> 'CrossValidation':
-        """Compare true and named classes (R,) in deg over folds of (train, test) rows."""
+        """Compare true and predicted classes (R,) in deg over folds of (train, test) rows."""
         confusion = np.zeros((len(CLASSES_DEG), len(CLASSES_DEG)), dtype=np.int64)
         true, named = (np.searchsorted(CLASSES_DEG, x) for x in (true_deg, named_deg))
         np.add.at(confusion, (true, named), 1)
@@ -39,8 +39,8 @@ class CrossValidation:
 def grouped_folds(
     dataset: CalibrationDataset, seed: int, folds: int = 5
 ) -> list[tuple[Rows, Rows]]:
-    """Rows to train and to test with, of each fold; a tube configuration is on one side only."""
-    # Classes are as frequent in every fold.
+    """Rows for training and test of each fold; each tube configuration is on one side only."""
+    # Stratified: classes are equally frequent in every fold.
     classes = np.unique(dataset.class_deg)
     least = min(len(set(dataset.configuration[dataset.class_deg == c])) for c in classes)
     if not 2 <= folds <= least:
@@ -49,7 +49,7 @@ def grouped_folds(
             f'{least} recorded tubes a class do not make {folds} folds: {may}, or make more of '
             'them with `endoscope dataset --n`'
         )
-    # Only training divides rows: a node that classifies would load it for nothing, and for seconds.
+    # Imported here, since only training needs it, and the import takes seconds.
     from sklearn.model_selection import StratifiedGroupKFold
 
     splitter = StratifiedGroupKFold(folds, shuffle=True, random_state=seed)
@@ -77,8 +77,8 @@ def train_network(
     seed: int,
     settings: TrainingSettings | None = None,
 ) -> TensionCnn:
-    """The network, trained with tensions (R, 9000, 4) in N of classes (R,), to evaluate."""
-    # The same seed, of first weights and order of batches, gives the same weights on the same
+    """The network trained on tensions (R, 9000, 4) in N of classes (R,), in evaluation mode."""
+    # The same seed (of initial weights and order of batches) gives the same weights on the same
     # machine.
     settings = settings or TrainingSettings()
     torch.manual_seed(seed)

@@ -1,4 +1,4 @@
-"""`endoscope bench papers`: the tables of both papers, theirs beside ours."""
+"""`endoscope bench papers`: the tables of both papers, compared with our figures."""
 
 import argparse
 import importlib
@@ -30,11 +30,11 @@ OURS = {
     'load_cells': 'Calibrations with load cells as they are',
     'reading_rates': 'Calibrations with load cells that are read slowly',
 }
-"""Tables that no paper has, printed where they are asked for."""
+"""Tables without a counterpart in the papers, printed on request."""
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure and print; return 0 if every aim is kept, else 1."""
+    """Measure and print; return 0 if every aim is reached, else 1."""
     titles = chosen('table', args.only, TABLES | OURS) if args.only else TABLES
     if args.tubes < FEWEST_CONFIGURATIONS:
         raise InputError(
@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
             'configurations'
         )
     if 'classifiers' in titles:
-        # Says now rather than after the other tables what it needs.
+        # Reports a missing PyTorch now rather than after the other tables.
         importlib.import_module('endoscope_lab.papers.networks')
     settings = PapersBench(args.seed, args.tubes, report, args.motion, args.weights)
     missed = 0
@@ -53,8 +53,8 @@ def run(args: argparse.Namespace) -> int:
             for line in getattr(calibrations, f'{name}_text')(settings):
                 print(line, flush=True)
             continue
-        room = compensation if hasattr(compensation, f'{name}_rows') else classification
-        rows = getattr(room, f'{name}_rows')(settings)
+        module = compensation if hasattr(compensation, f'{name}_rows') else classification
+        rows = getattr(module, f'{name}_rows')(settings)
         missed += sum(row.reached is False for row in rows)
         print(f'\n{title}\n{table_text(rows)}', flush=True)
     return 1 if missed else 0

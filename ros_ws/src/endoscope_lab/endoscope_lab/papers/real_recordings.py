@@ -1,7 +1,7 @@
-"""Models on recordings of a real flexible endoscope, where they are at hand.
+"""Models on recordings of a real flexible endoscope, if they are available.
 
-The recordings (sine of 60 deg in five tubes, about two cycles) do not come with this project. They
-are looked for in ``data/kaist`` of the folder that ENDOSCOPE_SHARED names.
+The recordings (sine of 60 deg in five tubes, about two cycles) are not part of this project. They
+are searched in ``data/kaist`` of the folder that ENDOSCOPE_SHARED names.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class RealRecording:
 
     @property
     def tension_width(self) -> float:
-        """Width of the settled loop of the tensions; knows nothing of the actual angle."""
+        """Width of the settled loop of the tensions, without the actual angle."""
         loop = self.within(*_SETTLED)
         tension = self.tension[loop]
         return float(
@@ -63,19 +63,19 @@ class RealRecording:
 
 
 def recordings_folder() -> Path | None:
-    """Where the recordings lie, None if they do not."""
+    """Folder of the recordings; None if it does not exist."""
     shared = os.environ.get('ENDOSCOPE_SHARED')
     folder = Path(shared or Path(__file__).parents[6] / 'shared') / 'data' / 'kaist'
     return folder if folder.is_dir() else None
 
 
 def real_recordings(folder: Path | None = None) -> list[RealRecording]:
-    """All recordings, sorted by the bend of the tube; none where they are not at hand."""
+    """All recordings, sorted by the bend of the tube; empty if they are not available."""
     folder = folder or recordings_folder()
     if folder is None:
         return []
     found = []
-    # The tubes are named by their bend; other files of the folder are recordings of another form.
+    # Tubes are named by their bend; other files of the folder have another format.
     for path in folder.glob('[0-9]*.txt'):
         table = without_repeats(np.loadtxt(path, delimiter=','))
         found.append(
@@ -91,7 +91,7 @@ def real_recordings(folder: Path | None = None) -> list[RealRecording]:
 
 
 def without_repeats(table: Array) -> Array:
-    """Rows of a recording without those that repeat the one before: the file's clock is faster."""
+    """Rows of a recording without repetitions, since the file's clock is faster."""
     return np.asarray(table[np.diff(table[:, PHASE], prepend=-1.0) != 0.0])
 
 
@@ -100,10 +100,10 @@ def left_of_the_rest(
 ) -> dict[int, tuple[float, float]]:
     """RMSE in rad on 1.3 cycles, which were fitted, and on the rest of two, by the tube's bend.
 
-    `predicted` fits a model to a recording, and says its actual angle (N,) for a driving one, rad.
+    `predicted` fits a model to a recording and returns its actual angle (N,) for a driving angle,
+    in rad.
     """
-    # The first cycle begins at rest, and never shows the rise from the far end: loops are fitted
-    # from the first one that is whole.
+    # The first cycle starts at rest and lacks the rise from the far end; 1.3 cycles include it.
     found = {}
     for recording in recordings:
         first = recording.within(0.0, FITTED_CYCLES * CYCLE_S)
@@ -124,10 +124,10 @@ def tension_loop_width(
     desired: ArrayLike, tension_positive: ArrayLike, tension_negative: ArrayLike
 ) -> float:
     """Width, in the unit of the angle (N,), of the loop of both wires' tension difference in N."""
-    # The difference of the tensions is the load of the joint's drive, and leads the desired angle:
-    # at a reversal friction turns round at the motor first. On real recordings its width falls
-    # along a straight line with the backlash size; on the simulated rig it falls from a capstan
-    # exponent of 0.7 on, and hardly changes below.
+    # The difference of the tensions is the load of the joint's drive, and leads the desired angle,
+    # since at a reversal friction changes its sign at the motor first. On real recordings its width
+    # falls linearly with the backlash size; on the simulated rig it falls from a capstan exponent
+    # of 0.7 on, and hardly changes below.
     difference = np.asarray(tension_negative, dtype=float) - np.asarray(tension_positive)
     return width_at_mid_height(desired, difference)
 

@@ -1,4 +1,4 @@
-"""One printed line of a table: the papers' figure, ours, and what is aimed at."""
+"""One printed line of a table: the papers' figure, ours, and the aim."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,11 +11,11 @@ from endoscope_core.signals import SINUSOID
 
 @dataclass(frozen=True)
 class PapersBench:
-    """What every table of the bench is asked for."""
+    """Settings of every table of the bench."""
 
-    seed: int  # chooses tubes, rigs and noise
+    seed: int  # of tubes, rigs and noise
     tubes: int  # tube configurations for each row, at least five
-    report: Callable[[str], None]  # takes a line that says how far it has come
+    report: Callable[[str], None]  # takes a line of progress
     motion: str = SINUSOID  # of a calibration, in the tables of load cells
     weights: Path | None = None  # of the classifier there; None for the shipped ones
 
@@ -27,14 +27,14 @@ class Row:
     name: str  # what is measured, with its unit
     values: Sequence[float]  # ours, one for each tube configuration (or fold, or recording)
     paper: str = ''  # the papers' figure as they print it; empty where they have none
-    at_most: float | None = None  # to be kept by the mean of `values`
-    at_least: float | None = None  # to be kept by the mean of `values`
+    at_most: float | None = None  # limit of the mean of `values`
+    at_least: float | None = None  # limit of the mean of `values`
     digits: int = 2  # after the point
-    note: str = ''  # what a reader must know to take the figure right
+    note: str = ''  # needed to interpret the figure
 
     @property
     def reached(self) -> bool | None:
-        """Whether the aim is kept; None where there is none. What is not finite keeps none."""
+        """Whether the aim is reached; None without an aim. A mean that is not finite misses it."""
         if self.at_most is None and self.at_least is None:
             return None
         mean = float(np.mean(self.values))
@@ -52,7 +52,7 @@ class Row:
 
     @property
     def aim(self) -> str:
-        """The aim in words; empty where there is none."""
+        """The aim in words; empty without an aim."""
         parts = []
         if self.at_least is not None:
             parts.append(f'≥ {self.at_least:g}')
@@ -62,7 +62,7 @@ class Row:
 
 
 def table_text(rows: Sequence[Row]) -> str:
-    """Rows in columns: figure, paper, ours, number of values, aim and whether it is kept."""
+    """Rows in columns: figure, paper, ours, number of values, aim and whether it is reached."""
     cells = [('figure', 'paper', 'ours (mean ± sd)', 'n', 'aim', '')]
     for row in rows:
         verdict = {None: '', True: 'kept', False: 'MISSED'}[row.reached]

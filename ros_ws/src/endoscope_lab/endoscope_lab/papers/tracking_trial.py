@@ -1,4 +1,4 @@
-"""Rigs in tubes that nothing was fitted on: calibrated, and moved along a signal."""
+"""Rigs in tubes that no fit has used: calibrated, and moved along a signal."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ LIMITS = MotorLimits.of(shipped_rig())
 
 @dataclass(frozen=True)
 class TrackingTrial:
-    """What came of it, N ticks of 1 ms, J joints; angles in rad."""
+    """Result of a trial, N ticks of 1 ms, J joints; angles in rad."""
 
     time: NDArray[np.float64]  # (N,)
     desired: NDArray[np.float64]  # (N,)
@@ -64,7 +64,7 @@ def run_tracking_trial(
     feedback: bool,
     seed: int,
 ) -> TrackingTrial:
-    """Drive every joint of a rig along a signal; feedback is by the tracker's noisy readings."""
+    """Drive every joint of a rig along a signal; feedback is from the tracker's noisy readings."""
     rig, sensors = PlantSimulator(plant, TICK), SensorModel(plant.sensors, seed)
     joints = len(rig.joints)
     gear = shipped_rig().joints.gear
@@ -73,7 +73,7 @@ def run_tracking_trial(
         Feedforward(joints, FeedforwardSettings(LIMITS)),
     )
     feedforward.select(law)
-    # In mode 'adaptive_physical' the law learns from them, otherwise the controller.
+    # In mode 'adaptive_physical' the law learns from the readings, otherwise the controller.
     learns = law.mode == ADAPTIVE_PHYSICAL
     controller = AdaptiveBacklashController(joints)
     if feedback and not learns:
@@ -104,7 +104,7 @@ def run_tracking_trial(
 
 SHARE_OF_REACH = 0.8
 SMALLEST_SIZE_DEG, GREATEST_SIZE_DEG = 42.0, 98.0
-# Data sets draw from the seed alone; this keeps tubes judged on apart from tubes learnt from.
+# Data sets draw from the seed alone; this separates test tubes from training tubes.
 _UNSEEN = 424_243
 _MOST_RIGS = 1000
 
@@ -129,7 +129,7 @@ def configuration_of(generator: np.random.Generator, size: float) -> TubeConfigu
 
 
 def never_seen_tube(seed: int, number: int, size_deg: float | None = None) -> NeverSeenTube:
-    """Draw a rig and how evenly its tube is bent, which gives it a backlash of 42 to 98 deg."""
+    """Draw a rig and the unevenness of its tube, for a backlash of 42 to 98 deg."""
     generator = np.random.default_rng([_UNSEEN, seed, number])
     drawn = float(generator.uniform(SMALLEST_SIZE_DEG, GREATEST_SIZE_DEG))
     size = np.deg2rad(drawn if size_deg is None else size_deg)
@@ -139,7 +139,7 @@ def never_seen_tube(seed: int, number: int, size_deg: float | None = None) -> Ne
 
 def calibrate(tube: NeverSeenTube, classifier: Classifier) -> CalibrationFindings:
     """The 9 s calibration, read through noisy sensors: class, size, and plant of both joints."""
-    # Neither class nor size is found where the classifier has never seen the like.
+    # Without class and size where the classifier refuses the tensions as unseen.
     recording = record_calibration(tube.plant, tube.noise)
     gear = shipped_rig().joints.gear
     plants = plants_of_calibration(recording.desired_angle, recording.tension, gear)
@@ -151,12 +151,12 @@ def calibrate(tube: NeverSeenTube, classifier: Classifier) -> CalibrationFinding
 
 
 def within_reach(signal: Signal, plant: PlantDescription) -> Signal:
-    """A signal, scaled to 80 % of what every joint of a plant reaches where that is less."""
+    """A signal, scaled to 80 % of the reach of every joint of a plant if that is less."""
     return within_ranges(signal, [bending_range(joint, LIMITS) for joint in plant.joints.values()])
 
 
 def within_ranges(signal: Signal, ranges: Sequence[BendingRange]) -> Signal:
-    """A signal, scaled to 80 % of the nearest end of any range where that is less."""
+    """A signal, scaled to 80 % of the nearest end of any range if that is less."""
     angle, _ = signal(np.arange(0.0, signal.duration, 0.01))
     end = min(min(-float(reached.low), float(reached.high)) for reached in ranges)
     return signal.scaled(min(1.0, SHARE_OF_REACH * end / float(np.max(np.abs(angle)))))

@@ -1,7 +1,7 @@
-"""Conceals something in rigs, explains their recordings, and opens what was sealed."""
+"""Proof with sealed truths: injects effects into rigs, explains their recordings, compares."""
 
 OWN, OTHER = 'own', 'other'
 SIMULATORS = (OWN, OTHER)
-"""Whose laws are concealed: those of the kernel, or those of a simulator that shares nothing."""
+"""Simulator of the injected laws: the kernel, or another one that shares no code with it."""
 SLAVE = 'slave'
-"""The form of a rig that is the simulated slave, running in the graph."""
+"""The simulated slave, running in the graph, as the rig."""

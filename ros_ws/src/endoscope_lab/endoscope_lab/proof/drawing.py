@@ -1,4 +1,4 @@
-"""Rigs for the proof, each with something concealed in it, or with nothing."""
+"""Rigs for the proof, each with an injected effect, or without one."""
 
 from dataclasses import replace
 
@@ -21,15 +21,15 @@ from endoscope_nodes.names import JOINTS
 Generator = np.random.Generator
 
 UNKNOWN = 1.0 / 6.0
-"""Share of the rigs in which a law is concealed that no catalogue has."""
+"""Share of the rigs with an injected law that is not in the catalogue."""
 
 
 class NoSuchEffectError(EndoscopeError, ValueError):
-    """An effect that cannot be concealed."""
+    """An effect that cannot be injected."""
 
 
 def require_drawn(effect: str, form: str) -> None:
-    """Raise NoSuchEffectError of an effect that is not among those drawn."""
+    """Raise NoSuchEffectError for an effect that cannot be injected into rigs of a form."""
     known = list(FORMS if form == OTHER else DRAWN)
     if form == SLAVE:
         known = [each for each in known if describe(each).stage is not Stage.RECORDING]
@@ -40,7 +40,7 @@ def require_drawn(effect: str, form: str) -> None:
 
 
 def drawn(form: str, seed: int, number: int, effect: str | None = None) -> tuple[Case, dict]:
-    """Draw a rig of `SIMULATORS` or `SLAVE` and, unless given, its effect; its truth as data."""
+    """Draw a rig of `SIMULATORS` or `SLAVE` and, unless given, its effect; with truth as data."""
     generator = np.random.default_rng([seed, number])
     if form == OTHER:
         return of_other_simulator(generator, effect)
@@ -48,7 +48,7 @@ def drawn(form: str, seed: int, number: int, effect: str | None = None) -> tuple
 
 
 def _of_slave(generator: Generator, effect: str | None) -> tuple[Case, dict]:
-    """A rig of both joints, with what a slave that runs can have."""
+    """A rig of both joints, with an effect that a running slave can have."""
     while True:
         case, truth = _own(generator, effect)
         if all(law.stage != Stage.RECORDING for law in case.laws):

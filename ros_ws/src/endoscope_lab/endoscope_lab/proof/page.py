@@ -1,4 +1,4 @@
-"""The page that shows truth beside answer."""
+"""The page that compares truths and explanations."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -10,7 +10,7 @@ from endoscope_explain.report.figures import TIME, look
 from endoscope_explain.report.numbers import digits
 from endoscope_explain.report.sentences import plain
 from endoscope_lab.proof import sentences
-from endoscope_lab.proof.trial import TRUTH, Outcome, folder_of, report_of, telling
+from endoscope_lab.proof.trial import TRUTH, Outcome, folder_of, report_of, worst_stretch
 from endoscope_nodes.names import JOINTS
 from endoscope_pages import Curve, Plot, figure_html, render_page
 
@@ -20,7 +20,7 @@ PLANTS = ('nominal', 'refitted', 'augmented')
 
 
 def page(outcomes: Sequence[Outcome], facts: Mapping[str, str]) -> str:
-    """HTML of the proof: a page that needs no other file, with links to the reports beside it."""
+    """HTML of the proof: a self-contained page with links to the reports."""
     return render_page(
         'endoscope_lab',
         'proof/templates/proof.html.j2',
@@ -39,8 +39,8 @@ def _rig(outcome: Outcome) -> dict:
         'sha256': outcome.rig.sha256,
         'sealed': f'{folder_of(number)}/{TRUTH}',
         'report': report_of(number),
-        'concealed': sentences.concealed(outcome),
-        'said': sentences.said(answer.said),
+        'injected': sentences.injected(outcome),
+        'reported': sentences.reported(answer.reported),
         'sentence': answer.sentence,
         'result': sentences.result(outcome),
         'right': outcome.judgement.exact,
@@ -54,7 +54,7 @@ def _rig(outcome: Outcome) -> dict:
 
 
 def _followed(outcome: Outcome) -> str:
-    """Desired and measured angle of the joint on which more is concealed, by either plant."""
+    """Desired and measured angle of the joint with the first injected law, by either plant."""
     joints = [law.joint for law in outcome.rig.laws if law.joint] or list(JOINTS)
     j = JOINTS.index(joints[0])
     runs = outcome.tracking
@@ -70,8 +70,8 @@ def _followed(outcome: Outcome) -> str:
 
 
 def _figure(outcome: Outcome) -> str:
-    """The signal in which the missing physics shows most, and what each plant misses of it."""
-    shown = telling(outcome.answer.passage)
+    """The signal in which the missing physics shows most, and the error of each plant."""
+    shown = worst_stretch(outcome.answer.passage)
     factor, unit = (180.0 / np.pi, 'deg') if shown.unit == 'rad' else (1.0, shown.unit)
     measured = factor * shown.measured
     predicted = {name: factor * shown.predicted[name] for name in PLANTS}
@@ -91,7 +91,7 @@ def _with_errors(
     errors_title: str,
     errors: Mapping[str, Array],
 ) -> str:
-    """A reference with the curve of each plant, its times and values, and their errors beside."""
+    """Plots of a reference with the curve (times and values) of each plant, and of their errors."""
     curves = [Curve(x=x, y=y, width=1.3, **look(name)) for name, (x, y) in plants.items()]
     missed = [Curve(x=plants[name][0], y=y, width=1.3, **look(name)) for name, y in errors.items()]
     return figure_html(

@@ -1,4 +1,4 @@
-"""The order of a proof: record and seal all rigs, tell the digests, explain, and only then open."""
+"""The order of a proof: record and seal all rigs, print the digests, explain, then open."""
 
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -19,52 +19,52 @@ from endoscope_lab.proof.trial import (
     recorded,
 )
 
-Say = Callable[[str], None]
+Report = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class Proof:
-    """What is to be proven."""
+    """Settings of a proof."""
 
     count: int  # rigs
     form: str  # of `SIMULATORS`, or `SLAVE`
     seed: int
-    effect: str | None  # what is concealed; drawn if None
-    jobs: int  # rigs side by side
+    effect: str | None  # injected effect; drawn if None
+    jobs: int  # rigs in parallel
     command: str  # as it was typed
 
 
-def prove(proof: Proof, folder: Path, say: Say) -> list[Outcome]:
-    """Record rigs into a folder, explain them, and compare what is said with what was sealed."""
+def prove(proof: Proof, folder: Path, report: Report) -> list[Outcome]:
+    """Record rigs into a folder, explain them, and compare explanations with sealed truths."""
     with worker_pool(min(proof.jobs, proof.count)) as pool:
-        rigs = _recorded(proof, folder, pool, say)
-        answers = _explained(proof, rigs, pool, say)
-        say('The seals are opened:')
+        rigs = _recorded(proof, folder, pool, report)
+        answers = _explained(proof, rigs, pool, report)
+        report('The seals are opened:')
         outcomes = [compared(rig, answers[rig.number]) for rig in rigs]
         for each in outcomes:
-            say(
-                f'rig {each.rig.number}: concealed was {sentences.concealed(each)}: '
+            report(
+                f'rig {each.rig.number}: injected was {sentences.injected(each)}: '
                 f'{sentences.result(each)}; second recording {digits(each.answer.before)} > '
                 f'{digits(each.answer.after)} times its noise'
             )
         if proof.form == SLAVE:
-            outcomes = _followed(proof, outcomes, pool, say)
+            outcomes = _followed(proof, outcomes, pool, report)
     return outcomes
 
 
 def _followed(
-    proof: Proof, outcomes: list[Outcome], pool: ProcessPoolExecutor, say: Say
+    proof: Proof, outcomes: list[Outcome], pool: ProcessPoolExecutor, report: Report
 ) -> list[Outcome]:
-    say('The slaves are moved by the inverse of either plant:')
+    report('The slaves track a motion with the inverse of either plant:')
     tasks = [pool.submit(followed, each.rig.folder, each.truth, proof.seed) for each in outcomes]
     moved = []
     for each, task in zip(outcomes, tasks, strict=True):
         moved.append(replace(each, tracking=task.result()))
-        say(f'rig {each.rig.number}: {sentences.tracking(moved[-1])}')
+        report(f'rig {each.rig.number}: {sentences.tracking(moved[-1])}')
     return moved
 
 
-def _recorded(proof: Proof, folder: Path, pool: ProcessPoolExecutor, say: Say) -> list[Rig]:
+def _recorded(proof: Proof, folder: Path, pool: ProcessPoolExecutor, report: Report) -> list[Rig]:
     tasks = [
         pool.submit(recorded, proof.form, proof.seed, k, proof.effect, folder / folder_of(k))
         for k in range(1, proof.count + 1)
@@ -72,17 +72,17 @@ def _recorded(proof: Proof, folder: Path, pool: ProcessPoolExecutor, say: Say) -
     rigs = []
     for task in tasks:
         rigs.append(task.result())
-        say(f'rig {rigs[-1].number}: recorded; sealed, SHA-256 {rigs[-1].sha256}')
+        report(f'rig {rigs[-1].number}: recorded; sealed, SHA-256 {rigs[-1].sha256}')
     return rigs
 
 
 def _explained(
-    proof: Proof, rigs: list[Rig], pool: ProcessPoolExecutor, say: Say
+    proof: Proof, rigs: list[Rig], pool: ProcessPoolExecutor, report: Report
 ) -> dict[int, Answer]:
     tasks = [pool.submit(explained, rig.number, rig.folder, proof.command) for rig in rigs]
     answers = {}
     for task in as_completed(tasks):
         answer = task.result()
         answers[answer.number] = answer
-        say(f'rig {answer.number}: {answer.sentence} ({answer.seconds:.0f} s)')
+        report(f'rig {answer.number}: {answer.sentence} ({answer.seconds:.0f} s)')
     return answers

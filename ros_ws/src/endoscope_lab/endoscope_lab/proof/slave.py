@@ -1,4 +1,4 @@
-"""The proof on the running slave: recorded through the whole graph, and compensated afterwards."""
+"""The proof on the running slave: recorded by the whole graph, then compensated."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -17,18 +17,18 @@ from endoscope_nodes.client.plant_adoption import AdoptedPlants
 from endoscope_nodes.names import JOINTS, MASTER_NODE
 
 EXPLAINED, JUDGED, TRACKED = 'commissioning', 'non_periodic', 'periodic'
-"""Motions of the master: that is explained, that the plants are judged on, that is compensated."""
+"""Motions of the master: to explain, to judge the plants on, and to track with compensation."""
 REST_S = 1.0
-"""After a motion."""
+"""Rest after a motion."""
 SMALLER = 0.4
-"""Factor on the size of the tracked motion, 60 deg: every plant that is drawn reaches it."""
+"""Factor on the amplitude of the tracked motion, 60 deg, so that every drawn plant reaches it."""
 SAMPLE_S = 0.01
 LATEST_S = 4.0
-"""Before a file, the master goes to its first angle."""
+"""Longest time in which the master goes to the first angle of a file."""
 
 
 def record(plant: PlantDescription, motion: str, bag: Path, seed: int) -> None:
-    """Record a motion of the master, played on the slave that a plant describes."""
+    """Record a motion of the master on the slave that a plant describes."""
 
     def play(graph: LiveGraph) -> None:
         graph.set(MASTER_NODE, source='motion', motion=motion, joints=list(JOINTS))
@@ -38,9 +38,9 @@ def record(plant: PlantDescription, motion: str, bag: Path, seed: int) -> None:
 
 
 def tracked(slave: PlantDescription, known: PlantDescription, folder: Path, seed: int) -> Tracked:
-    """Move the slave by the inverse of the plant that is known; `folder` is made here.
+    """Track a motion with the inverse of the `known` plant; creates `folder`.
 
-    RefusedAdoptionError if the compensator does not take that plant.
+    RefusedAdoptionError if the compensator refuses that plant.
     """
     folder.mkdir()
     motion = motion_by_name(TRACKED)
@@ -49,7 +49,7 @@ def tracked(slave: PlantDescription, known: PlantDescription, folder: Path, seed
     write_command_file(file, time, SMALLER * motion.sample(time)[0], JOINTS)
 
     def play(graph: LiveGraph) -> None:
-        # The plant's inverse alone is judged.
+        # Only the inverse of the plant is judged, without feedback.
         graph.set('controller', active=False)
         AdoptedPlants(graph.client).adopt(plant_as_text(known))
         graph.set(MASTER_NODE, command_file=str(file), source='file')
@@ -62,7 +62,7 @@ def tracked(slave: PlantDescription, known: PlantDescription, folder: Path, seed
 def _played(
     plant: PlantDescription, bag: Path, seed: int, play: Callable[[LiveGraph], None]
 ) -> None:
-    # Where nobody who explains looks.
+    # In a folder that the explanation does not read.
     with TemporaryDirectory() as hidden:
         file = Path(hidden) / 'slave.yaml'
         save_plant(plant, file)

@@ -1,4 +1,4 @@
-"""Recordings in memory as bags with the signals of the graph."""
+"""One rig of a proof: recorded to bags, sealed, explained, compared."""
 
 import hashlib
 import json
@@ -38,11 +38,11 @@ from endoscope_lab.proof import SLAVE, slave
 from endoscope_lab.proof.drawing import drawn
 
 BEGIN_NS = 1_000_000_000
-"""First stamp: a simulation's clock that has run for a second."""
+"""First stamp, one second after the start of simulated time."""
 
 
 def write_bag(recording: Recording, out: Path) -> None:
-    """Write commands, motors, wires and tip at their stamps; BagError if it exists or cannot be."""
+    """Write commands, motors, wires and tip at their stamps; BagError if `out` cannot be made."""
     motors = [motor_name(joint) for joint in recording.joints]
     wires = [wire for joint in recording.joints for wire in wire_names(joint)]
     sensors = recording.measured()
@@ -76,21 +76,21 @@ def write_bag(recording: Recording, out: Path) -> None:
 
 
 class BrokenSealError(EndoscopeError, ValueError):
-    """A truth is not what was sealed."""
+    """A sealed truth was changed."""
 
 
 def seal(path: Path, truth: dict) -> str:
     """Write a truth as JSON and return the SHA-256 of the file, in hex."""
-    # Without a number of its own a truth of few words could be guessed from its digest.
+    # Without a salt, a short truth could be guessed from its digest.
     content = json.dumps(truth | {'salt': secrets.token_hex(16)}, indent=1, default=str)
     path.write_text(content + '\n', encoding='utf-8')
     return digest(path)
 
 
-def opened(path: Path, told: str) -> dict:
-    """Read a truth whose digest was told before; BrokenSealError if the file is another one now."""
-    if digest(path) != told:
-        raise BrokenSealError(f'{path}: its SHA-256 is not the one that was told: it was changed')
+def opened(path: Path, published: str) -> dict:
+    """Read a truth whose digest was published; BrokenSealError if the file was changed since."""
+    if digest(path) != published:
+        raise BrokenSealError(f'{path}: its SHA-256 is not the published one: the file was changed')
     truth: dict = json.loads(path.read_text(encoding='utf-8'))
     return truth
 
@@ -107,25 +107,24 @@ RECORDING, SECOND = 'recording.mcap', 'second.mcap'
 FOLLOWED = 'followed'
 REPORT = 'report'
 PASSAGE_S = 6.0
-"""Of the second recording that is drawn."""
+"""Length of the second recording that is plotted."""
 
 
 @dataclass(frozen=True)
 class Rig:
-    """A rig that was recorded, with what is concealed in it sealed."""
+    """A recorded rig, with its truth sealed."""
 
     number: int
     folder: Path  # with the recordings, the described plant and the sealed truth
     sha256: str  # of the truth
-    # What is concealed; nobody looks at it until the seals are opened.
-    laws: tuple[Law, ...]
+    laws: tuple[Law, ...]  # injected; not used before the seals are opened
     also: frozenset[str]  # effects and places that are neither right nor false
-    moved: float  # share of the signal that the laws move
+    moved: float  # change by the laws, over the signal
 
 
 @dataclass(frozen=True)
 class Passage:
-    """The signal of the second recording in which most is left when only numbers are refitted."""
+    """The signal of the second recording with the largest residual of the refitted plant."""
 
     signal: str
     unit: str
@@ -136,35 +135,35 @@ class Passage:
 
 @dataclass(frozen=True)
 class Answer:
-    """What was said of a rig before its seal was opened."""
+    """The explanation of a rig before its seal was opened."""
 
     number: int
     sentence: str
-    said: tuple
-    # Misfit of the second recording over its noise, of the worst signal, with the plant as
+    reported: tuple
+    # Misfit of the second recording over its noise, for the worst signal, with the plant as
     # described, refitted and improved.
     before: float
     refitted: float
     after: float
     passage: Passage
-    seconds: float  # that it took
+    seconds: float  # time of explaining
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Truth beside answer."""
+    """Truth and answer of one rig, compared."""
 
     rig: Rig
     answer: Answer
     truth: dict  # as it was sealed
     judgement: Judgement
-    # How the slave follows a motion by the inverse of the plant as described, and as improved;
-    # empty of a rig that does not run.
+    # Tracking of a motion with the inverse of the plant as described, and as improved; empty for a
+    # rig that does not run.
     tracking: dict[str, Tracked] = field(default_factory=dict)
 
 
 def recorded(form: str, seed: int, number: int, effect: str | None, folder: Path) -> Rig:
-    """Draw a rig, record it twice, and seal what is concealed in it."""
+    """Draw a rig, record it twice, and seal its truth."""
     case, truth = drawn(form, seed, number, effect)
     folder.mkdir()
     sha256 = seal(folder / TRUTH, {'rig': number, 'form': form, 'seed': seed} | truth)
@@ -214,13 +213,13 @@ def explained(number: int, folder: Path, command: str) -> Answer:
 
 
 def compared(rig: Rig, answer: Answer) -> Outcome:
-    """Open a rig's seal and judge what was said of it; BrokenSealError if it was changed since."""
+    """Open a rig's seal and judge its explanation; BrokenSealError if the file was changed."""
     truth = opened(rig.folder / TRUTH, rig.sha256)
-    return Outcome(rig, answer, truth, judged(rig.laws, answer.said, rig.also))
+    return Outcome(rig, answer, truth, judged(rig.laws, answer.reported, rig.also))
 
 
 def followed(folder: Path, truth: dict, seed: int) -> dict[str, Tracked]:
-    """Move a slave by the inverse of its plant as described, and as improved."""
+    """Track a motion with the inverse of a slave's plant as described, and as improved."""
     keys = ('joints', 'sensors', 'effects')
     true = plant_from_mapping({key: truth[key] for key in keys})
     (folder / FOLLOWED).mkdir()
@@ -231,8 +230,8 @@ def followed(folder: Path, truth: dict, seed: int) -> dict[str, Tracked]:
     }
 
 
-def telling(passage: Passage) -> Passage:
-    """The stretch of a passage in which the refitted plant is furthest off."""
+def worst_stretch(passage: Passage) -> Passage:
+    """The stretch of a passage in which the error of the refitted plant is largest."""
     begins = np.arange(0.0, max(passage.time[-1] - PASSAGE_S, 0.0) + 0.25, 0.5)
     missed = np.r_[0.0, np.cumsum((passage.measured - passage.predicted['refitted']) ** 2)]
     ends = np.searchsorted(passage.time, begins + PASSAGE_S)
@@ -247,7 +246,7 @@ def telling(passage: Passage) -> Passage:
 
 
 def report_of(number: int) -> str:
-    """Path of a rig's report from the page."""
+    """Path of a rig's report, relative to the page."""
     return f'{folder_of(number)}/{REPORT}/{REPORT_HTML}'
 
 
@@ -255,5 +254,5 @@ def folder_of(number: int) -> str:
     return f'rig_{number}'
 
 
-def _misfit(case: ExplainedCase, rung: str) -> float:
-    return max(fit.ratio for fit in case.validation[rung].values())
+def _misfit(case: ExplainedCase, plant: str) -> float:
+    return max(fit.ratio for fit in case.validation[plant].values())

@@ -1,4 +1,4 @@
-"""What each tube says by itself, and all of them where the right name is withheld."""
+"""Explanation of each tube alone, and of all tubes where the right name is withheld."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -16,33 +16,33 @@ from endoscope_lab.real.rig import Plant, as_described, wide
 from endoscope_lab.real.takes import TUBES, read
 
 Array = NDArray[np.float64]
-Tell = Callable[[str], None]
+Report = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class Alone:
-    """What the whole loops of one tube lack, by themselves."""
+    """Missing physics by the whole loops of one tube alone."""
 
     tube: str
     named: tuple[str, ...]  # in the order in which they were found
     gain: float  # nats of the first one
-    p_value: float  # chance that a rig without it shows as much
-    # What has more evidence, and does not foretell the branches that the tube passes again.
+    p_value: float  # chance of such a gain in a rig without it
+    # Candidates with more evidence that do not predict the branches that the tube passes again.
     dismissed: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Withheld:
-    """What all tubes lack where friction of the bending section may not be named."""
+    """Missing physics of all tubes where friction of the bending section may not be named."""
 
     named: tuple[str, ...]
-    levels: tuple[Level, ...]  # what was tried
-    # Of the first function, by tube: the state at its nodes and the values there (NODES,).
+    levels: tuple[Level, ...]  # of the search
+    # The first function, by tube: the state at its nodes and the values there (NODES,).
     curves: tuple[tuple[Array, Array], ...] = field(repr=False)
 
 
-def each_alone(folder: Path, jobs: int, tell: Tell) -> list[Alone]:
-    """Explain the whole loops of each tube by themselves."""
+def each_alone(folder: Path, jobs: int, report: Report) -> list[Alone]:
+    """Explain the whole loops of each tube alone."""
 
     def one(tube: str) -> Alone:
         model = wide(read(folder / f'{tube}.txt').observation())
@@ -50,7 +50,7 @@ def each_alone(folder: Path, jobs: int, tell: Tell) -> list[Alone]:
         refitted = Plant(model, start).refitted()
         tried = search([(refitted, as_fit(model, start))], 1)
         first, named = tried.levels[0], tuple(t.name for t in decide(tried, 1).missing)
-        tell(f'{tube} alone: {", ".join(named) or "nothing"}')
+        report(f'{tube} alone: {", ".join(named) or "nothing"}')
         better = [c for c in first.not_foretelling if c.evidence > first.best.evidence]
         dismissed = tuple(c.terms[-1].id if c.terms else 'other numbers' for c in better)
         return Alone(tube, named, first.gain(first.best), first.p_value, dismissed)
@@ -58,11 +58,11 @@ def each_alone(folder: Path, jobs: int, tell: Tell) -> list[Alone]:
     return parallel_map(one, TUBES, jobs)
 
 
-def name_withheld(folder: Path, jobs: int, tell: Tell) -> Withheld:
+def name_withheld(folder: Path, jobs: int, report: Report) -> Withheld:
     """Explain the whole loops of all tubes together, without the friction of the section."""
     fits, described = fitted_as_one([read(folder / f'{t}.txt').observation() for t in TUBES])
     references = list(zip(fits, described, strict=True))
-    tried = search(references, jobs, 1, (SECTION,), report=tell)
+    tried = search(references, jobs, 1, (SECTION,), report=report)
     curves = []
     for found in tried.levels[0].best.fits:
         for family, own in zip(

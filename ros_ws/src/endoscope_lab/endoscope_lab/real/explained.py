@@ -1,4 +1,4 @@
-"""One physics for all recordings: found on five tubes, carried to other states of the rig."""
+"""One plant for all recordings: found on five tubes, applied to other states of the rig."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,15 +18,15 @@ from endoscope_explain.fit.pooled import deviations, fit_together, judged_alone
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.search.levels import Level, search
 from endoscope_lab.identification.family_fit import FITTED_CYCLES
-from endoscope_lab.real.rig import Plant, Told, as_described, best_refitted, wide
+from endoscope_lab.real.rig import JudgedTake, Plant, as_described, best_refitted, wide
 from endoscope_lab.real.takes import OTHERS, STATE, TIGHTENED, TUBES, UNKNOWN_TUBES, read
 
 Array = NDArray[np.float64]
-Tell = Callable[[str], None]
+Report = Callable[[str], None]
 
 MOST_EFFECTS = 3
 ROUNDS = 4
-"""Pooled fits, each begun where the one before ended."""
+"""Pooled fits, each started from the result of the last."""
 
 
 Number = tuple[float, float, float]
@@ -37,35 +37,35 @@ Number = tuple[float, float, float]
 class Tubes:
     """The five tubes."""
 
-    told: tuple[Told, ...]  # judged on what was not fitted
-    # Missing from all of them together; where none can be named, the best one.
+    takes: tuple[JudgedTake, ...]  # judged on samples that were not fitted
+    # Missing from all of them together; if none can be named, the best candidate.
     effects: tuple[str, ...]
-    named: bool  # the effects are named
-    search: tuple[str, ...]  # what it said
-    levels: tuple[Level, ...]  # what it tried
+    named: bool  # whether the effects are named
+    search: tuple[str, ...]  # its log
+    levels: tuple[Level, ...]  # of the search
     wide: tuple[Fit, ...]
     explained: tuple[Fit, ...]
 
 
-def explained_tubes(folder: Path, jobs: int, tell: Tell) -> Tubes:
-    """Fit all tubes together on their first 1.3 cycles, and search what they lack."""
+def explained_tubes(folder: Path, jobs: int, report: Report) -> Tubes:
+    """Fit all tubes together on their first 1.3 cycles, and search for missing physics."""
     takes = [read(folder / f'{name}.txt') for name in TUBES]
     fitted_s = [FITTED_CYCLES * take.cycle_s for take in takes]
     parts = [take.until(end).observation() for take, end in zip(takes, fitted_s, strict=True)]
     fits, described = fitted_as_one(parts)
     models = [each.model for each in described]
     starts = [each.theta for each in described]
-    said: list[str] = []
+    log: list[str] = []
 
-    def heard(text: str) -> None:
-        said.append(text)
-        tell(text)
+    def logged(text: str) -> None:
+        log.append(text)
+        report(text)
 
-    tried = search(list(zip(fits, described, strict=True)), jobs, MOST_EFFECTS, report=heard)
+    tried = search(list(zip(fits, described, strict=True)), jobs, MOST_EFFECTS, report=logged)
     named = bool(tried.found.effects) or not tried.levels
     chosen = tried.found if named else tried.levels[-1].best
     explained = chosen.fits
-    told = []
+    judged = []
     for take, end, model, start, before, after in zip(
         takes, fitted_s, models, starts, fits, explained, strict=True
     ):
@@ -75,13 +75,12 @@ def explained_tubes(folder: Path, jobs: int, tell: Tell) -> Tubes:
             'refitted': Plant.of(before).on(whole),
             'augmented': Plant.of(after).on(whole),
         }
-        told.append(Told(take, end, plants))
-    search_said = tuple(text for text in said if 'nats' in text)
+        judged.append(JudgedTake(take, end, plants))
     return Tubes(
-        tuple(told),
+        tuple(judged),
         chosen.effects,
         named,
-        search_said,
+        tuple(text for text in log if 'nats' in text),
         tried.levels,
         tuple(fits),
         tuple(explained),
@@ -89,7 +88,7 @@ def explained_tubes(folder: Path, jobs: int, tell: Tell) -> Tubes:
 
 
 def fitted_as_one(observations: Sequence[JointObservation]) -> tuple[list[Fit], list[Fit]]:
-    """Recordings of all tubes fitted as one instrument, and as described."""
+    """Fits of all tubes as one instrument, and the tubes as described."""
     models = [wide(each) for each in observations]
     starts = [as_described(model) for model in models]
     fits = fit_together(models, starts)
@@ -104,7 +103,7 @@ def as_fit(model: JointModel, theta: Array) -> Fit:
 
 
 def numbers(fits: Sequence[Fit], jobs: int) -> dict[str, list[Number | None]]:
-    """Numbers of several recordings by name; None where one lacks the effect."""
+    """Parameters of several recordings by name; None where a recording lacks the effect."""
     owners = {p: f'{e.id}.' for e in CATALOGUE.values() for p in e.places}
     found: dict[str, list[Number | None]] = {}
     for n, (one, deviation) in enumerate(zip(fits, deviations(fits), strict=True)):
@@ -123,25 +122,25 @@ def numbers(fits: Sequence[Fit], jobs: int) -> dict[str, list[Number | None]]:
 class State:
     """The rig in another state."""
 
-    told: tuple[Told, ...]  # the recording that was fitted, then those that are predicted from it
+    takes: tuple[JudgedTake, ...]  # the recording that was fitted, then those predicted from it
     fit: Fit  # with the tubes' effects
-    # Logarithm of the evidence that is lost without each of the tubes' effects.
+    # Loss of log evidence without each of the tubes' effects.
     needed: Mapping[str, float]
-    alone: tuple[str, ...]  # what would be named by this recording alone
+    alone: tuple[str, ...]  # names given by this recording alone
 
 
-def explained_state(folder: Path, tubes: Tubes, jobs: int, tell: Tell) -> State:
+def explained_state(folder: Path, tubes: Tubes, jobs: int, report: Report) -> State:
     """Explain a recording of the rig in another state by the tubes' effects, predict the others."""
     take = read(folder / f'{STATE}.txt')
     observation = take.observation()
-    tell(f'{take.name}: refitting the nominal plant')
+    report(f'{take.name}: refitting the nominal plant')
 
     def begun(found: Fit) -> Plant:
         return Plant.of(found).on(observation).with_cell_of_unknown_unit()
 
     # The instrument is the tubes'.
     before = best_refitted([begun(f) for f in judged_alone(tubes.wide)])
-    tell(f"{take.name}: explaining it by the tubes' effects")
+    report(f"{take.name}: explaining it by the tubes' effects")
     explained = judged_alone(tubes.explained)
     known = [f for f in explained if _has_all(f, tubes.effects)] or explained
     after = best_refitted([begun(f) for f in known])
@@ -150,7 +149,7 @@ def explained_state(folder: Path, tubes: Tubes, jobs: int, tell: Tell) -> State:
         if after.model.flags[KNOWN[effect].flag]:
             lesser = Plant(*without_effect(after, effect)).refitted()
             needed[effect] = log_evidence(after) - log_evidence(lesser)
-    told = [Told(take, 0.0, _plants(before, after, observation))]
+    judged = [JudgedTake(take, 0.0, _plants(before, after, observation))]
     for name in (*OTHERS, TIGHTENED):
         other = read(folder / f'{name}.txt')
         seen = other.observation()
@@ -158,12 +157,12 @@ def explained_state(folder: Path, tubes: Tubes, jobs: int, tell: Tell) -> State:
         if name == TIGHTENED:
             for key in ('refitted', 'augmented'):
                 plants[key] = Plant.of(plants[key].held(('pretension',), seen).refitted())
-        told.append(Told(other, 0.0, plants))
-    tell(f'{take.name}: what it would be given alone')
+        judged.append(JudgedTake(other, 0.0, plants))
+    report(f'{take.name}: explaining it alone')
     cycle = Plant.of(before).on(take.until(take.cycle_s).observation()).refitted()
     decision = decide(search([(cycle,)], jobs, MOST_EFFECTS), jobs)
     alone = tuple(term.name for term in decision.missing)
-    return State(tuple(told), after, needed, alone)
+    return State(tuple(judged), after, needed, alone)
 
 
 def _has_all(found: Fit, effects: Sequence[str]) -> bool:
@@ -179,16 +178,16 @@ def _plants(before: Fit, after: Fit, seen: JointObservation) -> dict[str, Plant]
     }
 
 
-def unknown_tubes(folder: Path, tubes: Tubes, tell: Tell) -> list[Told]:
-    """Recordings of tubes that nobody described.
+def unknown_tubes(folder: Path, tubes: Tubes, report: Report) -> list[JudgedTake]:
+    """Recordings in tubes without a description.
 
-    The instrument is that of the five tubes; a tube's own numbers are refitted, and what scatters
-    from tube to tube, drawn to their mean.
+    The instrument is that of the five tubes. The tube's own parameters are refitted, and those that
+    scatter from tube to tube are shrunk to their mean.
     """
-    # Every tube is tried as a start; 1.3 cycles are fitted, the others are judged.
+    # Every known tube is tried as a start; 1.3 cycles are fitted, the rest is judged.
     found = []
     for name in UNKNOWN_TUBES:
-        tell(f'{name}: refitting the tube')
+        report(f'{name}: refitting the tube')
         take = read(folder / f'{name}.txt')
         begin = FITTED_CYCLES * take.cycle_s
         part, whole = take.until(begin).observation(), take.observation()
@@ -197,5 +196,5 @@ def unknown_tubes(folder: Path, tubes: Tubes, tell: Tell) -> list[Told]:
         for key, fits in (('refitted', tubes.wide), ('augmented', tubes.explained)):
             starts = [Plant.of(f).on(part) for f in judged_alone(fits)]
             plants[key] = Plant.of(best_refitted(starts)).on(whole)
-        found.append(Told(take, begin, plants))
+        found.append(JudgedTake(take, begin, plants))
     return found

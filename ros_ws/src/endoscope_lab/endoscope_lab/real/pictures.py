@@ -1,4 +1,4 @@
-"""Pictures of real recordings beside what plants predict of them."""
+"""Plots of real recordings and of the predictions of plants."""
 
 import matplotlib
 import numpy as np
@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from endoscope_explain.report.numbers import PLANTS as LABEL
 from endoscope_lab.real.alone import Withheld
 from endoscope_lab.real.explained import Tubes
-from endoscope_lab.real.rig import Told
+from endoscope_lab.real.rig import JudgedTake
 from endoscope_lab.real.takes import TUBES
 from endoscope_lab.still_pictures import INK, STYLE, svg, thinned
 
@@ -21,20 +21,21 @@ LINE = {
 
 
 def five_loops(tubes: Tubes) -> str:
-    """The last loop of each tube as measured, without and with what was missing (SVG)."""
+    """The last loop of each tube as measured, and simulated without and with what was missing."""
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(11.0, 2.9), layout='constrained')
-        axes = figure.subplots(1, len(tubes.told), sharey=True)
-        for axis, told in zip(axes, tubes.told, strict=True):
-            channel = told.plants['refitted'].model.observation.channels[-1]
-            seen = channel.time >= channel.time[-1] - told.take.cycle_s
-            command = np.rad2deg(np.interp(channel.time, told.take.time, told.take.command))
+        axes = figure.subplots(1, len(tubes.takes), sharey=True)
+        for axis, judged in zip(axes, tubes.takes, strict=True):
+            take, plants = judged.take, judged.plants
+            channel = plants['refitted'].model.observation.channels[-1]
+            seen = channel.time >= channel.time[-1] - take.cycle_s
+            command = np.rad2deg(np.interp(channel.time, take.time, take.command))
             for label, values, colour, width in (
                 ('measured', channel.value, '#b8c1cc', 4.0),
-                ('simulated', told.plants['refitted'].predicted()[-1], LINE['nominal'][1], 1.2),
+                ('simulated', plants['refitted'].predicted()[-1], LINE['nominal'][1], 1.2),
                 (
                     'simulated, with what was missing',
-                    told.plants['augmented'].predicted()[-1],
+                    plants['augmented'].predicted()[-1],
                     LINE['augmented'][1],
                     1.2,
                 ),
@@ -42,7 +43,7 @@ def five_loops(tubes: Tubes) -> str:
                 axis.plot(
                     command[seen], np.rad2deg(values[seen]), color=colour, lw=width, label=label
                 )
-            axis.set_title(f'tube bent by {told.take.name} deg')
+            axis.set_title(f'tube bent by {take.name} deg')
             axis.set_xlabel('command (deg)')
         axes[0].set_ylabel('angle of the tip (deg)')
         handles = axes[0].get_legend_handles_labels()
@@ -50,18 +51,18 @@ def five_loops(tubes: Tubes) -> str:
         return svg(figure)
 
 
-def loops(told: Told, last: str) -> str:
+def loops(judged: JudgedTake, last: str) -> str:
     """Angle and tensions over the command, measured and as each plant predicts them (SVG)."""
-    take = told.take
-    channels = told.plants['nominal'].model.observation.channels
-    curves = {name: told.plants[name].predicted() for name in PLANTS}
+    take = judged.take
+    channels = judged.plants['nominal'].model.observation.channels
+    curves = {name: judged.plants[name].predicted() for name in PLANTS}
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(11.0, 3.3), layout='constrained')
         axes = figure.subplots(1, len(channels), squeeze=False)[0]
         order = [len(channels) - 1, *range(len(channels) - 1)]
         for axis, k in zip(axes, order, strict=True):
             channel = channels[k]
-            seen = channel.time >= told.begin
+            seen = channel.time >= judged.begin
             factor = np.rad2deg(1.0) if channel.quantity == 'bending' else 1.0
             command = np.rad2deg(np.interp(channel.time, take.time, take.command))
             for name, values in (
@@ -86,7 +87,7 @@ def loops(told: Told, last: str) -> str:
 
 
 def function_over_angle(withheld: Withheld) -> str:
-    """The function that is found where the name is withheld, one curve a tube (SVG)."""
+    """The function that is found where the name is withheld, one curve for each tube (SVG)."""
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(5.5, 3.2), layout='constrained')
         axis = figure.subplots()

@@ -1,4 +1,4 @@
-"""Each piece of the plant taken out of a real tube's fit, and what is then named in its place."""
+"""Ablation: each component of the plant removed from the fit of a real tube, and the new answer."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -26,40 +26,40 @@ PIECES = (
     AGE,
 )
 OTHER_WAY = 'load_cell_lag'
-"""How else cells are late."""
+"""The alternative explanation of late cells."""
 
 
 @dataclass(frozen=True)
 class TakenOut:
-    """One piece taken out of one tube."""
+    """One component removed from the plant of one tube."""
 
     piece: str
     tube: str
-    costs: float  # nats of evidence that the tube loses without it
-    named: tuple[str, ...]  # in the order in which it was said
-    number: tuple[float, float]  # its first parameter as found, nan if not, and in the whole plant
+    costs: float  # loss of evidence without it, nats
+    named: tuple[str, ...]  # in the order of the search
+    number: tuple[float, float]  # its first parameter as found, NaN if not, and in the whole plant
 
 
 @dataclass(frozen=True)
 class Late:
-    """Which cell of a tube is late, and how."""
+    """Latency of one cell of a tube, as a delay and as a lag."""
 
     tube: str
-    cell: str  # of which wire
+    cell: str  # suffix of its wire
     delay_s: float
     lag_s: float
-    for_delay: float  # nats by which a delay explains more than a lag
+    for_delay: float  # evidence for a delay against a lag, nats
 
 
 def whole_plant(observation: JointObservation) -> Fit:
-    """Whole loops of a tube, fitted by the plant with friction in its bending section."""
+    """Fit of the whole loops of a tube by the plant with friction in its bending section."""
     model = with_effect(wide(observation), KNOWN[SECTION], {})
     return Plant(model, as_described(model)).refitted()
 
 
-def taken_out(folder: Path, jobs: int, tell: Callable[[str], None]) -> list[TakenOut]:
-    """Take each piece out of each tube's plant, and explain the tube with what is left."""
-    tell('fitting whole loops of each tube')
+def taken_out(folder: Path, jobs: int, report: Callable[[str], None]) -> list[TakenOut]:
+    """Remove each component from each tube's plant, and explain the tube with the rest."""
+    report('fitting whole loops of each tube')
     seen = [read(folder / f'{tube}.txt').observation() for tube in TUBES]
     fits = parallel_map(whole_plant, seen, jobs)
     tasks = [
@@ -72,7 +72,8 @@ def taken_out(folder: Path, jobs: int, tell: Callable[[str], None]) -> list[Take
         decision = decide(search([(lesser,)], 1, 1), 1)
         found = decision.chosen
         number = _number(found.fit, piece) if piece in found.effects else float('nan')
-        tell(f'{tube} without {piece}: {", ".join(t.name for t in decision.missing) or "nothing"}')
+        names = ', '.join(term.name for term in decision.missing) or 'nothing'
+        report(f'{tube} without {piece}: {names}')
         return TakenOut(
             piece,
             tube,
@@ -90,9 +91,9 @@ def _number(found: Fit, piece: str) -> float:
 
 
 def late_cells(
-    folder: Path, jobs: int, tell: Callable[[str], None], tubes: Sequence[str] = TUBES
+    folder: Path, jobs: int, report: Callable[[str], None], tubes: Sequence[str] = TUBES
 ) -> list[Late]:
-    """Fit each tube to its angle and one of its cells alone, which is late by a delay or a lag."""
+    """Fit each tube to its angle and one of its cells alone, with a delay or a lag of the cell."""
 
     def one(task: tuple[str, str]) -> Late:
         tube, cell = task
@@ -104,7 +105,7 @@ def late_cells(
         without, begun = without_effect(delayed, AGE)
         lagging = with_effect(without, KNOWN[OTHER_WAY], {})
         lagged = Plant(lagging, lagging.begun_at(begun)).refitted()
-        tell(f'{tube}, cell of {cell}')
+        report(f'{tube}, cell of {cell}')
         return Late(
             tube,
             cell,

@@ -1,4 +1,4 @@
-"""Prandtl-Ishlinskii hysteresis, a weighted sum of plays, as a black box beside the real tubes."""
+"""Prandtl-Ishlinskii hysteresis, a weighted sum of plays, as a black-box baseline."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _WEIGHTS = (1.0 / 40.0, 3.0)
 
 
 def fitted(recording: Recording, driver: Array) -> Array:
-    """Actual angle (N,) in rad that the model of a recording from rest has for a driving angle.
+    """Actual angle (N,) in rad for a driving angle, by a model fitted to a recording from rest.
 
     ``theta_a = offset + sum_i w_i p_i`` with `p_i` the play of threshold `r_i` (Krejci and Kuhnen
     2001); weights that are not negative make it monotone.

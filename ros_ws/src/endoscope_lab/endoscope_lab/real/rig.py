@@ -1,4 +1,4 @@
-"""The rig as one wide nominal plant, and what a plant leaves of a recording."""
+"""The rig as one nominal plant with wide priors, and the residual of a plant on a recording."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -25,7 +25,7 @@ with the cosine is 27 um at 60 deg."""
 ZERO = 'load_cell_bias'
 """The zero of the first cell was never checked: slack, it still reads 0.8 N. It is fitted."""
 AGE = 'load_cell_delay'
-"""What a reading of the cells waits for beyond what the rig's program says is not known."""
+"""Latency of the cells, of which the rig's program shows only a part."""
 PLANT = PlantDescription(
     {JOINT: JointParameters()},
     effects=(
@@ -34,18 +34,18 @@ PLANT = PlantDescription(
         EffectSpec(AGE, JOINT, {'delay_s': 0.0}),
     ),
 )
-"""As described: a nominal tube whose bending section has no friction of its own, with the rig's
-kinematics and cells."""
+"""The described plant: a nominal tube whose bending section has no friction of its own, with the
+rig's kinematics and cells."""
 SERVO = ('motor_bandwidth', 'motor_damping_ratio')
 """The motors' currents show their lag, 55 to 92 ms, so that these keep the usual tolerance."""
 BAND = 3.0
-"""Of all others: they may be five times the described ones, or a fifth."""
+"""Tolerance of all other parameters: five times the described ones, or a fifth."""
 STANDS, STEPS = 1e-5, 60
-"""Share of the cost, and steps, after which a fit of one recording ends."""
+"""Convergence tolerance (share of the cost) and largest number of steps of a fit."""
 
 
 def wide(observation: JointObservation) -> JointModel:
-    """The nominal plant with all its numbers free, the joint's radius with them."""
+    """The nominal plant with all its parameters free, including the joint's radius."""
     base, flags = packed_joint(PLANT, JOINT)
     servo = {p.index: p for p in nominal_parameters(base) if p.name in SERVO}
     free = [
@@ -69,7 +69,7 @@ def wide(observation: JointObservation) -> JointModel:
 
 
 def as_described(model: JointModel) -> Array:
-    """Coordinates of the wide plant as described."""
+    """Coordinates of the described plant in the wide one."""
     return np.array([item.mean for item in model.free])
 
 
@@ -77,7 +77,7 @@ def as_described(model: JointModel) -> Array:
 class Plant:
     """A fitted plant, without a recording."""
 
-    model: JointModel  # whatever it was fitted to
+    model: JointModel  # with the recording of its fit
     theta: Array  # (n,)
 
     @staticmethod
@@ -85,7 +85,7 @@ class Plant:
         return Plant(found.model, found.theta)
 
     def held(self, free: Sequence[str], observation: JointObservation) -> 'Plant':
-        """The plant on another recording, with none but some of its numbers `free`."""
+        """The plant on another recording, with only the parameters `free` left to fit."""
         base, _ = self.model.packed(self.theta)
         kept = [k for k, item in enumerate(self.model.free) if item.name in free]
         items = tuple(self.model.free[k] for k in kept)
@@ -96,13 +96,13 @@ class Plant:
         return Plant(replace(self.model, observation=observation), self.theta)
 
     def with_cell_of_unknown_unit(self) -> 'Plant':
-        """The plant with a free gain of the second cell."""
+        """The plant with the gain of the second cell as a free parameter."""
         start = {'gain': 1.0, 'wire': 1.0}
         model = with_effect(self.model, CATALOGUE['load_cell_gain'], start)
         return Plant(model, model.begun_at(self.theta))
 
     def refitted(self) -> Fit:
-        """Fit what is free, channels weighted by what is left, until nothing moves any more."""
+        """Fit the free parameters to convergence, with channels weighted by their residuals."""
         found = fit(self.model, self.theta, self._weight(self.theta), STEPS, 1e-2)
         for tolerance in (1e-3, STANDS):
             found = fit(self.model, found.theta, self._weight(found.theta), STEPS, tolerance)
@@ -122,22 +122,22 @@ class Plant:
 
 
 def best_refitted(plants: Sequence[Plant]) -> Fit:
-    """The fit that leaves least, from several plants on one recording."""
+    """The fit with the least residual, of several starts on one recording."""
     fits = [plant.refitted() for plant in plants]
     return min(fits, key=lambda f: np.log(mean_squares(f.model.observation, f.residuals)).sum())
 
 
 @dataclass(frozen=True)
-class Told:
-    """What plants say of one recording."""
+class JudgedTake:
+    """One recording, and plants that are judged on a part of it."""
 
     take: Take
-    begin: float  # s; it is judged from here
+    begin: float  # of the judged part, s
     plants: Mapping[str, Plant]  # on the whole recording; keys are those of the report's plants
-    end: float = math.inf  # s; to here
+    end: float = math.inf  # of the judged part, s
 
     def left(self, name: str) -> tuple[float, ...]:
-        """Rms of what a plant is off by: angle in rad, then tensions in N."""
+        """Rms residual of a plant: angle in rad, then tensions in N."""
         plant, found = self.plants[name], []
         for channel, values in zip(
             plant.model.observation.channels, plant.predicted(), strict=True

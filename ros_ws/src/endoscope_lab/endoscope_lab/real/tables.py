@@ -1,4 +1,4 @@
-"""`endoscope bench real`: one physics for real recordings of a flexible endoscope."""
+"""`endoscope bench real`: one plant for real recordings of a flexible endoscope."""
 
 import argparse
 from collections.abc import Iterable, Mapping, Sequence
@@ -28,7 +28,7 @@ from endoscope_lab.real.explained import (
 )
 from endoscope_lab.real.pictures import PLANTS, five_loops, function_over_angle, loops
 from endoscope_lab.real.pieces import Late, TakenOut, late_cells, taken_out
-from endoscope_lab.real.rig import Told
+from endoscope_lab.real.rig import JudgedTake
 from endoscope_lab.real.takes import TUBES, between_cycles, require_recordings
 from endoscope_pages import html_table, render_page
 
@@ -38,7 +38,7 @@ PAGE = 'real.html'
 def run(args: argparse.Namespace) -> int:
     """Print the tables and write the page."""
     require_recordings(args.folder)
-    # A fit's matrices are tall and narrow: threads would only wait for each other.
+    # The matrices of a fit are tall and narrow, so that threads would only wait for each other.
     with threadpool_limits(1, 'blas'):
         tubes = explained_tubes(args.folder, args.jobs, report)
         state = explained_state(args.folder, tubes, args.jobs, report)
@@ -83,10 +83,10 @@ Rows = list[tuple[str, ...]]
 BETWEEN = ('two cycles differ by', 'angle, times that')
 
 
-def rmse_rows(told: Iterable[Told], extra: Mapping[str, float] | None = None) -> Rows:
-    """Rmse under each plant: deg of angle / N of the wires; then what two cycles differ by."""
+def rmse_rows(takes: Iterable[JudgedTake], extra: Mapping[str, float] | None = None) -> Rows:
+    """Rmse of each plant (deg of angle / N of the wires), then the difference of two cycles."""
     rows = []
-    for one in told:
+    for one in takes:
         reference = between_cycles(one.take)
         explained = one.left('augmented')
         ratio = explained[0] / reference[0]
@@ -105,7 +105,7 @@ def _rms(values: Sequence[float]) -> str:
 
 
 def number_rows(numbers: Mapping[str, Sequence[Number | None]]) -> Rows:
-    """A number with its interval for each recording; angles are in degrees."""
+    """Parameters with their intervals for each recording; angles are in degrees."""
     rows = []
     for name, found in numbers.items():
         shown, unit, factor = in_degrees(name, UNITS.get(name, ''))
@@ -118,7 +118,7 @@ def number_rows(numbers: Mapping[str, Sequence[Number | None]]) -> Rows:
 
 
 def worth_rows(levels: Sequence[Level]) -> Rows:
-    """What one term more is worth to all tubes, and to each by what the others say of it."""
+    """Gain of one more term for all tubes, and for each tube by a fit to the others."""
     rows = []
     for number, level in enumerate(levels, 1):
         for one in level.found:
@@ -132,22 +132,23 @@ def worth_rows(levels: Sequence[Level]) -> Rows:
 
 
 UNKNOWN = (
-    "The instrument is that of the five tubes. A tube's own numbers, and what scatters from tube "
-    'to tube, were fitted again on 1.3 cycles; the rest is judged.'
+    "The instrument is that of the five tubes. A tube's own parameters, and those that scatter "
+    'from tube to tube, were fitted again on 1.3 cycles; the rest is judged.'
 )
 WORTH = (
-    'Nats of the evidence of all tubes, and of each tube where it was left out: the others say '
-    'what the instrument is, what scatters is refitted to three quarters of its blocks, the fourth '
-    'is judged. What carries best is taken; chance of gains like these where it is worth nothing.'
+    'Gain of evidence in nats, for all tubes and for each tube when it is left out: the instrument '
+    'is that of the other tubes, parameters that scatter are refitted to three quarters of its '
+    'blocks, and the fourth is judged. The term that generalises best is taken. Last column: '
+    'chance of such gains from a term without effect.'
 )
 
 WITHHELD = 'The name withheld'
 NUMBERS_OF_PIECES = (
-    'The number as found, and in the whole plant, where the piece is named; what is named instead '
-    'where not; nats that it costs.'
+    'If the component is named: its parameter as found, and in the whole plant; otherwise the name '
+    'given instead. In parentheses: loss of evidence in nats.'
 )
 
-Section = tuple[str, str, tuple[str, ...], Rows, Sequence[Told]]
+Section = tuple[str, str, tuple[str, ...], Rows, Sequence[JudgedTake]]
 """Title, words, header and rows of a table, and recordings that are drawn; where some are, the
 fourth column's name is that of the last plant."""
 
@@ -158,13 +159,13 @@ def sections(
     black_box: Mapping[str, float],
     state: State,
     of_state: Mapping[str, Sequence[Number | None]],
-    unknown: Sequence[Told],
+    unknown: Sequence[JudgedTake],
 ) -> list[Section]:
-    """All that is said of the recordings, in order."""
+    """All sections about the recordings, in order."""
     last = 'explained' if tubes.named else f'with {" and ".join(tubes.effects)}, not named'
     plain = ('recording', 'described', 'refitted', last, *BETWEEN)
-    names = [one.take.name for one in tubes.told]
-    first = [replace(one, begin=0.0, end=one.begin) for one in tubes.told]
+    names = [one.take.name for one in tubes.takes]
+    first = [replace(one, begin=0.0, end=one.begin) for one in tubes.takes]
     needed = ', '.join(f'{e} {gain:.0f}' for e, gain in state.needed.items()) or 'nothing'
     alone = '; '.join(state.alone) or 'nothing'
     header = (*plain, 'Prandtl-Ishlinskii, angle')
@@ -177,7 +178,7 @@ def sections(
             (),
         ),
         (
-            'What one effect more is worth',
+            'Gain of one more effect',
             WORTH,
             ('step', 'effects', 'all', *names, 'chance'),
             worth_rows(tubes.levels),
@@ -188,13 +189,13 @@ def sections(
             'Tubes, the rest',
             'It was predicted.',
             header,
-            rmse_rows(tubes.told, black_box),
-            tubes.told,
+            rmse_rows(tubes.takes, black_box),
+            tubes.takes,
         ),
         (
             'Another state of the rig, numbers',
-            f"The instrument is the tubes'. Nats lost without: {needed}. Alone it names {alone}.",
-            ('number', state.told[0].take.name),
+            f"The instrument is the tubes'. Nats lost without: {needed}. Named alone: {alone}.",
+            ('number', state.takes[0].take.name),
             number_rows(of_state),
             (),
         ),
@@ -202,8 +203,8 @@ def sections(
             'Another state of the rig',
             'The first was fitted, others are predicted; of the last, pretension was refitted.',
             plain,
-            rmse_rows(state.told),
-            state.told,
+            rmse_rows(state.takes),
+            state.takes,
         ),
         (
             'Unknown tubes',
@@ -218,13 +219,13 @@ def sections(
 def thorough_sections(
     alone: Sequence[Alone], withheld: Withheld, late: Sequence[Late], out: Sequence[TakenOut]
 ) -> list[Section]:
-    """What is said of each tube alone, with the name withheld, of the cells, and of each piece."""
+    """Sections on each tube alone, the name withheld, late cells, and removed components."""
     pieces = {one.piece: [o for o in out if o.piece == one.piece] for one in out}
     first = sum(one.named[:1] == (one.piece,) for one in out)
     return [
         (
             'Each tube alone',
-            'Whole loops. Dismissed has more evidence, and does not foretell what comes again.',
+            'Whole loops. Dismissed: more evidence, but no prediction of repeated branches.',
             ('tube', 'named', 'nats', 'chance', 'dismissed'),
             [
                 (
@@ -262,9 +263,9 @@ def thorough_sections(
             (),
         ),
         (
-            'Pieces taken out',
+            'Components removed',
             f'Whole loops. Named first: {first} of {len(out)}. {NUMBERS_OF_PIECES}',
-            ('piece', *TUBES),
+            ('component', *TUBES),
             [(piece, *map(_taken_out, ones)) for piece, ones in pieces.items()],
             (),
         ),
@@ -275,10 +276,10 @@ def _taken_out(one: TakenOut) -> str:
     found, whole = one.number
     if one.piece in one.named:
         beside = f', after {one.named[0]}' if one.named[0] != one.piece else ''
-        said = f'{digits(found, 3)}, {digits(whole, 3)}{beside}'
+        result = f'{digits(found, 3)}, {digits(whole, 3)}{beside}'
     else:
-        said = one.named[0] if one.named else 'nothing'
-    return f'{said} ({one.costs:.0f})'
+        result = one.named[0] if one.named else 'nothing'
+    return f'{result} ({one.costs:.0f})'
 
 
 def as_text(parts: Iterable[Section]) -> str:
@@ -290,17 +291,17 @@ def as_text(parts: Iterable[Section]) -> str:
 
 
 def in_short(tubes: Tubes, box: Mapping[str, float]) -> dict[str, object]:
-    """What the page says first: mean rms of the angle that was not fitted, deg."""
+    """Summary of the page: mean rms of the angle that was not fitted, deg."""
 
     def mean(radians: Iterable[float]) -> float:
         return float(np.rad2deg(np.mean([*radians])))
 
-    between = mean(between_cycles(one.take)[0] for one in tubes.told)
-    after = mean(one.left('augmented')[0] for one in tubes.told)
+    between = mean(between_cycles(one.take)[0] for one in tubes.takes)
+    after = mean(one.left('augmented')[0] for one in tubes.takes)
     return {
         'named': tubes.named,
         'names': ' and '.join(KNOWN[e].physics.rstrip('.') for e in tubes.effects),
-        'before': f'{mean(one.left("refitted")[0] for one in tubes.told):.2f}',
+        'before': f'{mean(one.left("refitted")[0] for one in tubes.takes):.2f}',
         'after': f'{after:.2f}',
         'between': f'{between:.2f}',
         'ratio': f'{after / between:.2f}',
@@ -317,9 +318,12 @@ def page(
             title,
             words,
             html_table(header, rows, words=1),
-            [*(loops(one, header[3]) for one in told), *([drawn[title]] if title in drawn else [])],
+            [
+                *(loops(one, header[3]) for one in takes),
+                *([drawn[title]] if title in drawn else []),
+            ],
         )
-        for title, words, header, rows, told in parts
+        for title, words, header, rows, takes in parts
     ]
     return render_page(
         'endoscope_lab', 'real/templates/real.html.j2', sections=shown, hero=hero, story=story

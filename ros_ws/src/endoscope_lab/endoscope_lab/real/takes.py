@@ -1,9 +1,9 @@
-"""Recordings of the rig on a real clock, in SI units, as `explain` takes them.
+"""Real recordings on a real clock, in SI units, as `explain` takes them.
 
-Files have 8, 10, or 7 and 9 columns. What they are, and that the phase counts loops of a program
-and is no clock, was worked out from the numbers and the rig's program (nhoyh,
-hysteresis_compensation_ROS): a loop takes 22.75 ms for the tubes, else 1.087 ms; the tracker
-gives a value every 25 ms; tensions are a mean of five loops of a bridge that is read every 50 ms.
+Files have 7 to 10 columns. Their meaning was derived from the numbers and the rig's program
+(nhoyh, hysteresis_compensation_ROS). The phase counts loops of the program and is not a clock: a
+loop takes 22.75 ms for the tubes, else 1.087 ms. The tracker gives a value every 25 ms; tensions
+are a mean of five loops of a bridge that is read every 50 ms.
 """
 
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 JOINT = 'bend_x'
 TUBES = ('0', '60', '120', '180', '240')
 STATE, OTHERS, TIGHTENED = 'conf0_60', ('conf0_50', 'conf0_70'), 'conf0_60_'
-"""Another state of the rig; of other amplitudes; tightened again."""
+"""Another state of the rig; the same at other amplitudes; the same tightened again."""
 UNKNOWN_TUBES = ('odd_test', 'scnn_test', 'output', 'ff', 'aurora_ff')
 NAMES = (*TUBES, STATE, *OTHERS, TIGHTENED, *UNKNOWN_TUBES)
 KGF = 9.80665
@@ -36,7 +36,7 @@ COARSE = 5
 STEP = 1e-3
 """rad; near zero the tracker's angle moves in such steps."""
 SAME = 0.02
-"""rad, rms, by which commands that repeat themselves differ at most."""
+"""Largest rms difference of repeated commands, rad."""
 BRIDGE_S, MEAN_LOOPS = 0.05, 5
 _PHASE_DIGITS = 1e-4
 
@@ -52,7 +52,7 @@ class Take:
     seen: Array  # (M,), when the tracker gave a new value, s
     angle: Array  # (M,), rad
     tension: Array | None  # (M, 2), N
-    latency_s: float  # by how much tensions are older than their rows
+    latency_s: float  # age of tensions in their rows
 
     def until(self, end: float) -> 'Take':
         """The first `end` seconds."""
@@ -67,7 +67,7 @@ class Take:
         )
 
     def recording(self) -> Recording:
-        """As `explain` takes it, with the wires' latency taken off their stamps."""
+        """The recording for `explain`, with stamps of tensions corrected for their latency."""
         tension = np.full((len(self.seen), 2), np.nan) if self.tension is None else self.tension
         return Recording(
             self.name,
@@ -104,7 +104,7 @@ def read(path: Path) -> Take:
     if columns not in (7, 8, 9, 10):
         raise ValueError(f'{path}: {columns} columns: recordings have 7 to 10')
     steps = np.round(np.abs(np.diff(table[:, PHASE])) / _PHASE_DIGITS).astype(int)
-    # The phase falls back where a program ends; what it counted is in all the other steps.
+    # The phase falls back where a program ends; all other steps are counted loops.
     step = np.gcd.reduce(steps[steps < np.pi / _PHASE_DIGITS]) * _PHASE_DIGITS
     loop = 0.02275 if columns == 8 else 0.001087
     table, time = _on_a_clock(table, loop / step)
@@ -130,8 +130,8 @@ def read(path: Path) -> Take:
 
 
 def _on_a_clock(table: Array, seconds: float) -> tuple[Array, Array]:
-    """Rows that do not repeat the one before, and their seconds."""
-    # Once the command stands, so does the phase: rows are counted, by what they took before.
+    """Rows that do not repeat the last one, and their times in s."""
+    # When the command stops, so does the phase; from there on, rows are counted at their mean time.
     moving = int(np.flatnonzero(np.diff(table[:, DESIRED]))[-1]) + 1
     time = seconds * table[:, PHASE]
     time[moving:] = time[moving - 1] * np.arange(moving + 1, len(table) + 1) / moving
@@ -141,7 +141,7 @@ def _on_a_clock(table: Array, seconds: float) -> tuple[Array, Array]:
 
 
 def _noise(values: Array) -> float:
-    """Rms of white noise by third differences, which take out what is smooth, slips apart."""
+    """Rms of white noise by third differences, which remove smooth signals; robust to slips."""
     # A third difference has 20 times the variance (von Neumann et al., Ann. Math. Stat. 12, 1941).
     return float(1.4826 * np.median(np.abs(np.diff(values, 3, axis=0))) / np.sqrt(20.0))
 

@@ -1,1 +1,1 @@
-"""Training of the first paper's network, and how far it is to be trusted."""
+"""Training of the first paper's network, and calibration of its intervals and refusals."""

@@ -1,4 +1,4 @@
-"""Trains the classifier on simulated rigs and measures, on others, how far it is to be trusted."""
+"""Trains the classifier on simulated rigs, and calibrates it on rigs held out."""
 
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
@@ -41,7 +41,7 @@ Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 
 KEPT_EVERY = 500
-"""Steps after which the training is kept, to be resumed."""
+"""Steps between checkpoints, from which the training can resume."""
 _STANDARD = 256
 _WHITENED = 2048
 _RIDGE = 1e-3
@@ -50,21 +50,21 @@ _LEAST_RIGS, _LEAST_STEPS = 40, 10
 
 @dataclass(frozen=True)
 class CnnTraining:
-    """How much is simulated, and how the network is trained with it."""
+    """Settings of simulation and training."""
 
-    rigs: int = 5000  # simulated rigs to train with
+    rigs: int = 5000  # simulated rigs for training
     strange: int = 500  # recordings of slack wires and other motions
     held_out: int = 1000  # rigs on which intervals and refusals are calibrated
     steps: int = 6000  # of AdamW
     batch: int = 64  # recordings in each step
     warm_up: int = 600  # first steps, in which size is learnt by squared error, then by likelihood
-    spoilt: float = 0.15  # share of a batch that is of no tube
+    spoilt: float = 0.15  # share of a batch that belongs to no tube
     learning_rate: float = 4e-3  # peak of one cycle
     smoothing: float = 0.02  # of the labels
 
     @classmethod
     def of_size(cls, rigs: int, steps: int) -> 'CnnTraining':
-        """Settings for so many rigs and steps; EndoscopeError if too few to train or calibrate."""
+        """Settings by numbers of rigs and steps; EndoscopeError if these are too few."""
         if rigs < _LEAST_RIGS or steps < _LEAST_STEPS:
             raise EndoscopeError(
                 f'--n {rigs} and --steps {steps}: at least {_LEAST_RIGS} rigs and {_LEAST_STEPS} '
@@ -75,14 +75,14 @@ class CnnTraining:
 
 @dataclass(frozen=True)
 class TrainedCnn:
-    """A classifier, and how it came about."""
+    """A classifier, and the record of its training."""
 
     classifier: CnnClassifier
-    # What the rigs held out say for each instrument and reading rate: share of right classes, rms
+    # Results on rigs held out, for each instrument and reading rate: share of right classes, rms
     # error of the size in deg, share of sizes in their interval, and of rigs refused. Half of the
-    # rigs calibrate the intervals that the other half is judged by.
+    # rigs calibrate the intervals, the other half is judged by them.
     held_out: dict[str, dict[str, float]]
-    curve: list[tuple[int, float]]  # steps and mean loss since the entry before
+    curve: list[tuple[int, float]]  # steps, and mean loss since the last entry
 
 
 def train_cnn(
@@ -94,7 +94,7 @@ def train_cnn(
 ) -> TrainedCnn:
     """Simulate, train and calibrate; the same seed on the same machine gives the same weights.
 
-    The file `kept` holds the training's progress, from which an interrupted one goes on.
+    The file `kept` is a checkpoint, from which an interrupted training resumes.
     """
     settings = settings or CnnTraining()
     torch.set_num_threads(1)
@@ -114,7 +114,7 @@ def train_cnn(
 
 
 def description_of(trained: TrainedCnn, settings: CnnTraining, seed: int, command: str) -> dict:
-    """What the file beside the weights says."""
+    """Content of the file that describes the weights."""
     return {
         'motion': trained.classifier.motion,
         'classes_deg': list(CLASSES_DEG),
@@ -137,14 +137,15 @@ def loss_of(outputs: Tensor, size: Tensor, smoothing: float, warm: bool) -> Tens
     classes = len(CLASSES_DEG)
     none = torch.isnan(size)
     loss = nn.functional.binary_cross_entropy_with_logits(outputs[:, -1], none.float())
-    told, true = outputs[~none], size[~none]
+    predicted, true = outputs[~none], size[~none]
     centres = torch.deg2rad(torch.tensor(CLASSES_DEG, dtype=true.dtype, device=true.device))
     nearest = torch.argmin((true[:, None] - centres).abs(), dim=1)
-    loss = loss + nn.functional.cross_entropy(told[:, :classes], nearest, label_smoothing=smoothing)
-    error = told[:, classes] - (true - MIDDLE) / UNIT
+    logits = predicted[:, :classes]
+    loss = loss + nn.functional.cross_entropy(logits, nearest, label_smoothing=smoothing)
+    error = predicted[:, classes] - (true - MIDDLE) / UNIT
     if warm:
         return loss + torch.mean(error**2)
-    deviation = LEAST_DEVIATION / UNIT + torch.exp(told[:, classes + 1])
+    deviation = LEAST_DEVIATION / UNIT + torch.exp(predicted[:, classes + 1])
     return loss + torch.mean(torch.log(deviation) + 0.5 * (error / deviation) ** 2)
 
 
@@ -164,7 +165,7 @@ def batch_of(
     tension[strangers] = strange.tension[
         generator.integers(len(strange.tension), size=len(strangers))
     ]
-    # Before a cell's noise or after it: an amplifier clips the one, a converter the other.
+    # Half before a cell's noise, as an amplifier clips, half after it, as a converter does.
     early, late = np.array_split(spoilt[len(strangers) :], 2)
     for row in early:
         tension[row] = kinds[generator.integers(len(kinds))](tension[row], generator)
@@ -202,7 +203,7 @@ def _trained(
             for name, part in parts.items():
                 part.load_state_dict(state[name])
             begin, curve = state['step'], state['curve']
-            report(f'goes on after step {begin} of {settings.steps}')
+            report(f'resumes after step {begin} of {settings.steps}')
     network.train()
     losses = []
     for step in range(begin, settings.steps):
@@ -233,7 +234,7 @@ def _trained(
 
 
 def _white(network: TensionCnn, known: TrainingRigs, seed: int) -> dict[str, Single]:
-    """Mean of the features of the training, and what makes them white."""
+    """Mean of the features in training, and their whitening matrix."""
     some = read_of_all_kinds(known.tension[:_WHITENED], np.random.default_rng([seed, 7]))
     features = np.concatenate(
         [

@@ -1,4 +1,4 @@
-"""How far a network is to be trusted, measured on rigs held out from its training."""
+"""Calibration of a network's intervals and refusals on rigs held out from its training."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -23,16 +23,16 @@ Single = NDArray[np.float32]
 Generator = np.random.Generator
 
 READING_PERIODS = (1, 2, 5, 10)
-"""In ms."""
+"""Intervals between readings, ms."""
 NOISE, ZERO, GAIN = 0.02, 0.02, 0.01
-"""Rms noise of a reading in N, and deviations of zeros in N and of gains: of good cells."""
+"""Good cells: rms noise of a reading in N, standard deviations of zeros in N and of gains."""
 _POOR = 0.3
 _POORER = 5.0
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
 
 INSTRUMENTS = ('recorded instrument', 'nominal slave')
-"""Those that the network is to know: the one rigs are off from, and that which is simulated."""
+"""Instruments that the network must know: the recorded one, and the one that is simulated."""
 
 
 def read(
@@ -59,9 +59,9 @@ def read(
 
 
 def read_of_all_kinds(tension: Single, generator: Generator) -> Single:
-    """Readings (R, N, 4) as cells of every quality and rate give them: a period for each part.
+    """Readings (R, N, 4) by cells of every quality and rate, with one period for each part.
 
-    Three of ten recordings are of poorer cells, with five times the error of zero and gain.
+    Three of ten recordings are of poor cells, with five times the errors of zero and gain.
     """
     found = np.empty_like(tension)
     parts = np.array_split(np.arange(len(tension)), len(READING_PERIODS))
@@ -73,7 +73,7 @@ def read_of_all_kinds(tension: Single, generator: Generator) -> Single:
 
 
 def exchanged_in_a_joint(tension: Single, generator: Generator) -> Single:
-    """The cables of both cells of a joint are plugged in the wrong way round."""
+    """The cables of both cells of a joint are exchanged."""
     first = 2 * int(generator.integers(tension.shape[1] // 2))
     order = np.arange(tension.shape[1])
     order[[first, first + 1]] = first + 1, first
@@ -81,7 +81,7 @@ def exchanged_in_a_joint(tension: Single, generator: Generator) -> Single:
 
 
 def exchanged_across_joints(tension: Single, generator: Generator) -> Single:
-    """One cell of each joint is plugged in where that of the other belongs."""
+    """The cables of one cell of each joint are exchanged."""
     x, y = int(generator.integers(2)), 2 + int(generator.integers(2))
     order = np.arange(tension.shape[1])
     order[[x, y]] = y, x
@@ -89,21 +89,21 @@ def exchanged_across_joints(tension: Single, generator: Generator) -> Single:
 
 
 def unplugged(tension: Single, generator: Generator) -> Single:
-    """One cell shows its zero."""
+    """One cell reads zero."""
     found, wire = tension.copy(), _wire(tension, generator)
     found[:, wire] = 0.0
     return found
 
 
 def stuck(tension: Single, generator: Generator) -> Single:
-    """One cell stays at what it once showed."""
+    """One cell keeps one of its readings."""
     found, wire = tension.copy(), _wire(tension, generator)
     found[:, wire] = found[int(generator.integers(len(found))), wire]
     return found
 
 
 def clipped(tension: Single, generator: Generator) -> Single:
-    """One cell clips at 60 to 90 % of what its wire reaches."""
+    """One cell clips at 60 to 90 % of the largest tension of its wire."""
     found, wire = tension.copy(), _wire(tension, generator)
     limit = generator.uniform(0.6, 0.9) * np.max(found[:, wire])
     found[:, wire] = np.minimum(found[:, wire], limit)
@@ -111,7 +111,7 @@ def clipped(tension: Single, generator: Generator) -> Single:
 
 
 def drifting(tension: Single, generator: Generator, drift: float) -> Single:
-    """One cell drifts evenly by so many N over the recording, either way."""
+    """One cell drifts linearly by `drift` N over the recording, in either direction."""
     found, wire = tension.copy(), _wire(tension, generator)
     sign = generator.choice((-1.0, 1.0))
     found[:, wire] += np.linspace(0.0, sign * drift, len(found), dtype=np.float32)
@@ -150,11 +150,11 @@ STRANGE: dict[str, Callable[[Single, Generator], Single]] = {
     'slow': slow,
     'slack': slack,
 }
-"""What makes tensions (N, 4) in N those of no tube. Cells exchanged across joints are none of it:
-the joints of an instrument are made alike, and the size hardly changes. Nor is drift, which a loop
-that does not close shows by itself."""
+"""Faults after which tensions (N, 4) in N belong to no tube. Cells exchanged across joints are not
+among them, since the joints of an instrument are alike and the size hardly changes; nor is drift,
+which a loop that does not close shows by itself."""
 SUBTLE = (clipped, slow)
-"""Of those, what leaves most of a recording as it was; a training needs it more often."""
+"""Faults that change a recording little; training needs them more often."""
 
 
 def _wire(tension: Single, generator: Generator) -> int:
@@ -168,10 +168,10 @@ def calibrated(
     held_out: int,
     report: Report = lambda _: None,
 ) -> tuple[CnnClassifier, dict[str, dict[str, float]]]:
-    """Calibrate a network on `held_out` rigs, half of them like each instrument that it is to know.
+    """Calibrate a network on `held_out` rigs, half of them like each instrument that it must know.
 
-    The coverage holds for each of them (Vovk, Lindsay, Nouretdinov and Gammerman, Mondrian
-    confidence machine, 2003): limits are those of the instrument that needs the wider ones.
+    The coverage holds for each instrument (Vovk, Lindsay, Nouretdinov and Gammerman, Mondrian
+    confidence machine, 2003): limits are those of the instrument that needs wider ones.
     """
     unlimited = HeldOutCalibration(1.0, np.inf, np.inf)
     raw = CnnClassifier(weights, unlimited, CLASSES_DEG, motion)
@@ -196,12 +196,12 @@ def calibrated(
         parts.append((instrument, judgements, rigs.size))
     judge = CnnClassifier(weights, widest(halved), CLASSES_DEG, motion)
     rest = slice(1, None, 2)
-    told = {
+    figures = {
         f'{instrument}, {1000 // period} Hz': _figures(judge, _rows(j, rest), size[rest])
         for instrument, judgements, size in parts
         for period, j in judgements.items()
     }
-    return CnnClassifier(weights, widest(calibrations), CLASSES_DEG, motion), told
+    return CnnClassifier(weights, widest(calibrations), CLASSES_DEG, motion), figures
 
 
 def calibration_of(held_out: Judgement, true: Array, of_all_kinds: Judgement) -> HeldOutCalibration:
@@ -209,7 +209,7 @@ def calibration_of(held_out: Judgement, true: Array, of_all_kinds: Judgement) ->
 
     Intervals: split conformal prediction with errors in units of the network's own deviation
     (Lei et al., J. Am. Stat. Assoc. 113(523), 2018, sections 2.2 and 5.2). Refusals: of known
-    tubes as cells of every quality read them, half of what may be refused for either reason.
+    tubes read by cells of every quality, each of two reasons may refuse half of the allowed share.
     """
     scores = np.sort(np.abs(held_out.size - true) / held_out.deviation)
     rank = min(len(scores), math.ceil((len(scores) + 1) * LEVEL))
@@ -222,13 +222,13 @@ def calibration_of(held_out: Judgement, true: Array, of_all_kinds: Judgement) ->
 
 
 def widest(calibrations: Sequence[HeldOutCalibration]) -> HeldOutCalibration:
-    """Calibration that holds wherever one of several does: each number the greatest."""
+    """Calibration that holds wherever one of several does, with the largest of each number."""
     columns = zip(*(vars(each).values() for each in calibrations), strict=True)
     return HeldOutCalibration(*map(max, columns))
 
 
 def counted(report: Report, name: str) -> Callable[[int, int], None]:
-    """Progress that reports every 500th."""
+    """Progress callback that reports every 500th item."""
 
     def count(done: int, total: int) -> None:
         if done % 500 == 0 or done == total:

@@ -1,6 +1,6 @@
-"""The 1D-CNN of Table 2 of the first paper as PyTorch trains it, and what its networks share.
+"""The 1D-CNN of Table 2 of the first paper in PyTorch, and the common part of its networks.
 
-Only training needs PyTorch; without it, importing this module says in one line how to get it.
+Only training needs PyTorch; without it, importing this module raises a line on how to install it.
 """
 
 from itertools import pairwise
@@ -17,12 +17,12 @@ try:
 except ModuleNotFoundError as error:
     raise EndoscopeError(
         'training the networks of the first paper needs PyTorch: run `make -C ros_ws train`, '
-        'which says how large it is'
+        'which reports its size'
     ) from error
 
 
 class StandardisedTension(nn.Module):
-    """A network that sees each wire by mean and spread of what it is trained on."""
+    """A network whose input is standardised, wire by wire, by the training data."""
 
     offset: Tensor  # (4, 1) in N, like `scale` kept with the weights
     scale: Tensor
@@ -33,7 +33,7 @@ class StandardisedTension(nn.Module):
         self.register_buffer('scale', torch.ones(WIRES, 1))
 
     def standardise_by(self, tension: Tensor) -> None:
-        """Take mean and spread of each wire over recordings (R, 4, N) as the unit of the input."""
+        """Take mean and standard deviation of each wire over recordings (R, 4, N) as the unit."""
         self.offset = tension.mean(dim=(0, 2)).unsqueeze(1)
         self.scale = tension.std(dim=(0, 2)).unsqueeze(1)
 
@@ -45,8 +45,8 @@ class StandardisedTension(nn.Module):
 class TensionCnn(StandardisedTension):
     """Eight convolutions with batch normalisation and ReLU, then a dense layer of `outputs` logits.
 
-    Eight unpadded strides of three reduce 6,561 samples to exactly one: of 9,000 the last 2,439 are
-    not seen. Softmax belongs to the loss in training and to the caller otherwise.
+    Eight unpadded strides of three reduce 6,561 samples to exactly one, so that of 9,000 samples
+    the last 2,439 are not used. The loss applies softmax in training, otherwise the caller does.
     """
 
     def __init__(self, outputs: int) -> None:
@@ -64,7 +64,7 @@ class TensionCnn(StandardisedTension):
         return logits
 
     def weights(self) -> dict[str, np.ndarray]:
-        """Weights as `evaluated` takes them: each normalisation within its convolution."""
+        """Weights for `evaluated`, with each normalisation folded into its convolution."""
         state = {name: value.double().numpy() for name, value in self.state_dict().items()}
         found = {'offset': state['offset'][:, 0], 'scale': state['scale'][:, 0]}
         for k in range(len(CHANNELS)):

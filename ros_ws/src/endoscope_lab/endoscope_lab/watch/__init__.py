@@ -1,1 +1,1 @@
-"""Rigs that become different while they are watched."""
+"""Change detection: rigs that change while a watch monitors them."""

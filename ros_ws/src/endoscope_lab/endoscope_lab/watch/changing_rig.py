@@ -1,4 +1,4 @@
-"""Rigs that become different while they move, and what a watch says of them."""
+"""Change detection: rigs that change while they move, and the alarms of a watch."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -33,13 +33,13 @@ KINDS = {
     'slower servo': Part.ACTUATOR,
 }
 SIZES = (0.7, 1.5)
-"""Of what the catalogue of effects has as typical."""
-TOLD_WITHIN_S = 10.0
+"""Range of a change, over the typical size of the effect in the catalogue."""
+REPORTED_WITHIN_S = 10.0
 SEGMENT_S = 600.0
-"""Nominal motion after which rig, tube, sheath and hand are drawn anew."""
+"""Length of nominal motion of one drawn rig, tube, sheath and hand."""
 Moved = Callable[[np.random.Generator, int], Array]
 """Draws setpoints (N, J) in rad for J joints."""
-# A hand half of the time, otherwise motions made to identify.
+# Half of the time a surgeon's hand, otherwise identification motions.
 _MOTIONS: tuple[Moved, ...] = (
     motions.commissioning,
     motions.another,
@@ -64,41 +64,41 @@ _OF_EFFECT = {
     'gear backlash': ('gear_backlash', 0.0, 0.1),
     'slower servo': ('actuator_lag', 0.0, 0.03),
 }
-"""Effect of the catalogue, its first parameter when it is off, and what a typical one adds."""
+"""Effect of the catalogue, the neutral value of its first parameter, and its typical offset."""
 _BOTH_WAYS = ('cell zero', 'cell gain', 'tracker shift', 'contact')
 _SLIPPED_M, _LOST_N, _TIGHTER, _ROUGHER, _STIFFNESS = 5e-4, 1.6, 0.6, 0.6, 0.01
 
 
 @dataclass(frozen=True)
 class Watched:
-    """What a watch said of one rig; times in s of motion."""
+    """Alarms of a watch on one rig; times in s of motion."""
 
     kind: str  # in `KINDS`, or empty for none
     seed: int
     changed_at: float
-    told_at: float  # first alarm; NaN where nothing was told
+    alarm_at: float  # first alarm; NaN if there was none
     part: str  # likeliest of that alarm, or empty
-    said: tuple[str, ...]
+    alarms: tuple[str, ...]
     largest: Mapping[str, float]  # largest gain of each part
 
     @property
     def early(self) -> bool:
-        """Whether something was told before anything had changed."""
-        return bool(self.said) and not (self.kind and self.told_at > self.changed_at)
+        """Whether there was an alarm before anything had changed."""
+        return bool(self.alarms) and not (self.kind and self.alarm_at > self.changed_at)
 
     @property
-    def told(self) -> bool:
-        """Whether the change was told in time."""
-        return not self.early and self.told_at <= self.changed_at + TOLD_WITHIN_S
+    def reported(self) -> bool:
+        """Whether the change was reported in time."""
+        return not self.early and self.alarm_at <= self.changed_at + REPORTED_WITHIN_S
 
     @property
     def right(self) -> bool:
-        """Whether it was told of its part."""
-        return self.told and self.part == KINDS[self.kind]
+        """Whether it was reported for its part of the rig."""
+        return self.reported and self.part == KINDS[self.kind]
 
 
 def watched(kind: str, seed: int, thresholds: Mapping[str, float] = THRESHOLDS) -> Watched:
-    """Move a drawn rig on one core, change it if there is a kind, and watch it."""
+    """Move a drawn rig on one core, change it if a kind is given, and watch it."""
     with threadpool_limits(1):
         return _watched(kind, seed, thresholds)
 
@@ -142,7 +142,7 @@ def motion_of(generator: np.random.Generator, seconds: float, kinds: Sequence[Mo
 def show(
     watch: RigWatch, sensors: SensorModel, begin: int, setpoint: Array, readings: Array
 ) -> None:
-    """Show a watch noise-free readings (J, N, OUTPUTS) from a tick on, by a rig's sensors."""
+    """Feed a watch with noise-free readings (J, N, OUTPUTS) from a tick on, through sensors."""
     time, out = (begin + np.arange(len(setpoint))) * TICK, readings.transpose(1, 0, 2)
     watch.setpoint.append(time, setpoint)
     shaft = sensors.shaft_position(out[:, :, layout.OUT_MOTOR])
@@ -156,7 +156,7 @@ def show(
 
 
 class MovingRig:
-    """A simulated rig at rest, whose packed numbers and state may be changed while it moves."""
+    """A simulated rig at rest, whose packed parameters and state may be changed while it moves."""
 
     def __init__(self, plant: PlantDescription) -> None:
         self.parameters, self._on = pack(plant)
@@ -173,7 +173,7 @@ class MovingRig:
 
 
 class _ChangingRig(MovingRig):
-    """A simulated rig whose numbers, or wires, become others at a moment."""
+    """A simulated rig whose parameters, or wires, change at a moment."""
 
     def __init__(
         self, generator: np.random.Generator, true: PlantDescription, kind: str, at: float
@@ -217,7 +217,7 @@ class _ChangingRig(MovingRig):
         elif self._kind == 'higher friction':
             row[layout.JOINT_FRICTION] *= 1.0 + self._size * _ROUGHER
         elif self._kind == 'contact':
-            # Where the motion has been before: what is not touched cannot be told.
+            # Within the range of the motion so far: a contact that is not touched is unobservable.
             first = describe('contact').first_parameter
             row[first] = self._depth * self._bent[int(self._sign > 0.0)]
             row[first + 1] = self._size * _STIFFNESS

@@ -1,4 +1,4 @@
-"""What watching the rig costs the graph at 1 kHz."""
+"""CPU time that watching the rig costs the graph at 1 kHz."""
 
 import os
 import tempfile
@@ -13,13 +13,13 @@ from endoscope_nodes.graph import ALL_NODES
 TARGET_CORES = 0.1
 _ROUNDS, _SECONDS = 2, 10.0
 _LEARNT_S = 45.0
-"""Of motion, after which every block is judged."""
+"""Motion after which every block is judged."""
 
 
 def run() -> int:
     """Print the figures; return 1 if watching costs more than it may."""
     cores: dict[bool, list[float]] = {False: [], True: []}
-    # In turn, so that what else the machine does spoils both alike.
+    # In turn, so that other load on the machine affects both alike.
     for _ in range(_ROUNDS):
         for watched, costs in cores.items():
             costs.append(_in_lock_step(watched, _SECONDS))
@@ -46,7 +46,7 @@ def _overrides(folder: str, watched: bool, seconds: float) -> dict[str, dict[str
 
 
 def _in_lock_step(watched: bool, seconds: float) -> float:
-    """Least CPU time of all nodes in one process in a second of motion."""
+    """Least CPU time of all nodes in one process for one second of motion."""
     with tempfile.TemporaryDirectory() as folder:
         return least_cores(_overrides(folder, watched, _LEARNT_S + seconds), _LEARNT_S, seconds)
 

@@ -1,4 +1,4 @@
-"""`endoscope bench watch`: whether a rig that becomes different is noticed, and nothing else."""
+"""`endoscope bench watch`: change detection, the share of detected changes and false alarms."""
 
 import argparse
 import math
@@ -24,15 +24,15 @@ from endoscope_lab.watch import cost
 from endoscope_lab.watch.changing_rig import KINDS, SEGMENT_S, Watched, watched
 
 _PER_HOUR = 0.1
-"""False alarms in an hour of motion that the thresholds are derived for, all parts together."""
+"""False alarms per hour of motion for which the thresholds are derived, all parts together."""
 _HOURS = SEGMENT_S / 3600.0
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print a table, or the thresholds; return 0."""
+    """Print the table, or the thresholds; return 0."""
     if args.cost:
         return cost.run()
-    # Nothing is told where thresholds are derived, so that each rig is judged to its end.
+    # Without alarms where thresholds are derived, so that each rig is watched to its end.
     thresholds = dict.fromkeys(map(str, Part), math.inf) if args.derive else THRESHOLDS
     kinds = () if args.derive else tuple(chosen('change', args.only, KINDS))
     rows = {(row.kind, row.seed): row for row in rows_so_far(args.json, Watched)}
@@ -57,34 +57,34 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _in_turn(changes: Sequence[tuple[str, int]], nominal: Sequence[int]) -> list[tuple[str, int]]:
-    """Cases of both sorts in proportion, so that a run that is ended early has its share."""
+    """Cases of both sorts in proportion, so that a run that ends early has some of each."""
     places = [(k / len(changes), case) for k, case in enumerate(changes)]
     places += [(k / len(nominal), ('', seed)) for k, seed in enumerate(nominal)]
     return [case for _, case in sorted(places, key=lambda each: each[0])]
 
 
 def derived(rows: Sequence[Watched]) -> str:
-    """The module of the thresholds, from nominal motion."""
-    # The largest gain of a segment follows a law of extreme values (Gumbel, Statistics of Extremes,
-    # 1958); it is the root of a gain that is about normal. Each part has an equal share of the
-    # false alarms.
+    """Source of the module of thresholds, from nominal motion."""
+    # The largest gain of a segment follows an extreme value distribution (Gumbel, Statistics of
+    # Extremes, 1958), fitted to the root of the gain, which is about normal. Each part has an equal
+    # share of the false alarms.
     share = _PER_HOUR * _HOURS / len(Part)
     quantile, lines = float(gumbel_r.isf(share)), []
     for part in Part:
-        # By moments: a part of which nothing is ever seen has no likelihood to fit; its threshold
-        # is that of a likelihood ratio (Ville, Etude critique de la notion de collectif, 1939).
+        # By moments, since a part without any gain has no likelihood to fit; its threshold is that
+        # of a likelihood ratio (Ville, Etude critique de la notion de collectif, 1939).
         roots = np.sqrt([row.largest[part] for row in rows])
         scale = float(np.std(roots)) * math.sqrt(6.0) / math.pi
         place = float(np.mean(roots)) - np.euler_gamma * scale
         largest = max(row.largest[part] for row in rows)
-        # A tail heavier than the law's shows in the largest one, which is no alarm either.
+        # The largest gain, in which a heavier tail would show, must raise no alarm.
         least = max(largest, -math.log(share))
         threshold = float(f'{max((place + scale * quantile) ** 2, least):.3g}')
         lines.append(f"    '{part}': {threshold!r},  # largest seen: {largest:.3g}")
     first, last = rows[0].seed, rows[-1].seed
     return (
-        '"""Gains of the likelihood\'s logarithm at which a change of each part is told.\n\n'
-        f'From {len(rows) * _HOURS:g} h of motion of rigs that stay as they are, by\n'
+        '"""Gains of the likelihood\'s logarithm at which a change of each part is reported.\n\n'
+        f'From {len(rows) * _HOURS:g} h of motion of rigs that do not change, by\n'
         f'`endoscope bench watch --derive --nominal {first}-{last}`.\n"""\n\n'
         + '\n'.join(['THRESHOLDS = {', *lines, '}'])
         + f'\nFALSE_ALARMS_PER_HOUR = {_PER_HOUR}\n"""Of motion, for which they are derived."""\n'
@@ -92,15 +92,15 @@ def derived(rows: Sequence[Watched]) -> str:
 
 
 def _print(rows: Sequence[Watched], kinds: Sequence[str]) -> None:
-    print(table_head('change', 'rigs', 'told within 10 s', 'right stage', 'told before it'))
+    print(table_head('change', 'rigs', 'reported within 10 s', 'right stage', 'reported before it'))
     for kind in (*kinds, 'all'):
         of = [row for row in rows if row.kind and kind in (row.kind, 'all')]
-        counts = [sum(getattr(row, name) for row in of) for name in ('told', 'right', 'early')]
+        counts = [sum(getattr(row, name) for row in of) for name in ('reported', 'right', 'early')]
         print(table_row(kind, len(of), *counts))
     nominal = [row for row in rows if not row.kind]
     false = sum(row.early for row in nominal)
     print(f'false alarms: {false} in {len(nominal) * _HOURS:.1f} h of nominal motion')
     for row in rows:
         if row.early or (row.kind and not row.right):
-            said = '; '.join(row.said) or 'nothing told'
-            print(f'{row.kind or "nominal"}, seed {row.seed}: {said}')
+            alarms = '; '.join(row.alarms) or 'no alarm'
+            print(f'{row.kind or "nominal"}, seed {row.seed}: {alarms}')
