@@ -87,7 +87,7 @@ def test_a_tube_that_is_bent_more_is_told_with_stage_and_time(watched):
     graph, _ = watched
     level, message, values = said(graph.diagnostics['watch: rig'][-1])
     assert level == WARN
-    assert message.startswith('bend_x is not as described any more: sheath')
+    assert message.startswith('bend_x no longer matches its plant: sheath')
     assert values['bend_x stage'].split(' or ')[0] == 'sheath'
     assert float(values['bend_x margin']) >= 1.0
     assert 'bend_y stage' not in values
@@ -99,7 +99,7 @@ def test_a_tube_that_is_bent_more_is_told_with_stage_and_time(watched):
 def test_the_bag_of_an_alarm_begins_before_the_change_and_can_be_explained(watched, files):
     [path] = event_bags(files)
     [event] = events_of(open_bag(path).metadata)
-    assert event.reason.startswith('watch: bend_x is not as described any more: sheath')
+    assert event.reason.startswith('watch: bend_x no longer matches its plant: sheath')
     recording = recording_from_bag(path, PlantDescription())
     assert recording.duration > 45.0
 
