@@ -189,14 +189,14 @@ def test_another_server_of_a_page_at_the_handle_is_another_sender(rig):
         rig.until(lambda: rig.handle_senders() == ['console_web'], 'the other one')
         # A server of which nobody knows yet cannot be refused.
         rig.passes(1.0)
-        said = 'console_web speaks for the handle already'
+        why = 'the handle topics are already published by console_web'
 
         def is_refused():
             answer = page.order('claim')
             page.order('release')
-            return said in answer['why']
+            return why in answer['why']
 
-        rig.until(is_refused, said)
+        rig.until(is_refused, why)
         rig.until(lambda: page.state['lease']['holder'] == '', 'no lease')
 
 

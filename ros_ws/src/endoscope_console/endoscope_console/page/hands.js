@@ -50,8 +50,8 @@ export class Hands {
     this._buttons = new Set();
   }
 
-  /** Take the greatest grip that the server has heard of. */
-  told(grips) {
+  /** Continue after the greatest number of a grip that the server knows. */
+  countFrom(grips) {
     this.grips = Math.max(this.grips, grips);
   }
 
@@ -62,7 +62,7 @@ export class Hands {
     return this._end(reason);
   }
 
-  /** A key went down; return whether that is news for the server. */
+  /** A key went down; return whether the server must be notified. */
   keyDown(code, repeat) {
     const known = isMotionKey(code) || code.startsWith('Shift');
     if (repeat || !known || this._keys.has(code)) return false;
