@@ -1,7 +1,7 @@
 """A terminal whose keys are read one by one, and which is put back as it was found.
 
 It sends a key's character or sequence when the key is pressed and again at each repeat (ECMA-48,
-xterm control sequences), and nothing when it is let go of.
+xterm control sequences), and nothing when it is released.
 """
 
 import codecs

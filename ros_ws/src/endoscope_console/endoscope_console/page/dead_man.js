@@ -124,7 +124,7 @@ export class DeadMan {
     });
     element.addEventListener('pointermove', (event) => {
       if (!hands.pointerMove(name, event.pointerId, event.clientX, event.clientY)) return;
-      // Another button pressed or let go of on the way comes as a move.
+      // Another button pressed or released on the way comes as a move.
       if (event.pointerType === 'mouse' && !(event.buttons & 1)) {
         if (hands.pointerUp(name, event.pointerId)) this.send();
       } else if (performance.now() - this._sent >= MOVE_MS) this.send();

@@ -2,8 +2,8 @@
  * What the operator's hands do, as input frames: no browser in here, and time is passed in.
  *
  * One device holds at a time. A grip begins where a device is taken hold of while none is held, and has
- * a number above all before it; it ends when that device is let go of, or when anything makes `letGo`
- * necessary. What is still pressed then has to be let go of and pressed again.
+ * a number above all before it; it ends when that device is released, or when anything makes `letGo`
+ * necessary. What is still pressed then has to be released and pressed again.
  */
 
 import { SOURCE } from './frames.js';
@@ -152,7 +152,7 @@ export class Hands {
     return !this.held && Boolean((pad && !pad.mouse) !== (thumb && !thumb.mouse));
   }
 
-  /** Whether anything is pressed or deflected that has to be let go of first. */
+  /** Whether anything is pressed or deflected that has to be released first. */
   get busy() {
     const { x, y } = this.motion;
     return this.held || ['keyboard', 'pad', 'gamepad'].some((d) => this._holds(d)) || Math.hypot(x, y) >= 0.1;

@@ -234,7 +234,7 @@ function readings(tensions) {
 
 const TABS = ['operate', 'plots', 'see', 'explain'];
 
-/** Bring one of the pages to the front; what is held is let go of, since the section is out of sight. */
+/** Bring one of the pages to the front; the grip is released, since the section is out of sight. */
 function show(tab) {
   if (app.tab === tab) return;
   app.tab = tab;

@@ -370,7 +370,7 @@ export class Operate {
     if (this.app.hands.modes.pad !== mode) this.toggleMode('pad');
   }
 
-  /** What is held is let go of first: the view is covered. */
+  /** The grip is released first: the view is covered. */
   _help() {
     this.app.deadMan.letGo('the help is open');
     $('help').showModal();
