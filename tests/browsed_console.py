@@ -79,11 +79,11 @@ class BrowsedConsole:
             *('console', '--no-graph', '--port', str(self._port)),
             *('--token-file', str(self.folder / 'tokens'), '--bags', str(self.folder)),
         )
-        told = ''
+        output = ''
         for _ in range(2):
-            told += self._process.stdout.readline()
-        found = re.findall(r'(http://127\.0\.0\.1:(\d+))/#token=(\S+)', told)
-        assert len(found) == 2, told + self._process.stderr.read()
+            output += self._process.stdout.readline()
+        found = re.findall(r'(http://127\.0\.0\.1:(\d+))/#token=(\S+)', output)
+        assert len(found) == 2, output + self._process.stderr.read()
         (self.address, port, self.operator), (_, _, self.viewer) = found
         self._port = int(port)
 
@@ -159,8 +159,8 @@ def until(page: Page, condition: Callable[[], bool], what: str = 'it') -> None:
     """Let the page go on until something has come true."""
     end = time.monotonic() + _LONGEST_S
     while not condition():
-        said = page.locator('#next').inner_text()
-        assert time.monotonic() < end, f'{what} does not come; the page says {said!r}'
+        shown = page.locator('#next').inner_text()
+        assert time.monotonic() < end, f'{what} does not come; the page says {shown!r}'
         page.wait_for_timeout(20)
 
 

@@ -38,11 +38,11 @@ class Page:
     hello
         Answer to the first words on the socket for commands.
     state
-        As last told.
+        As last received.
     picture
         The newest one.
     lost
-        What was said of a lease that was lost.
+        Messages about a lost lease.
     sends
         Whether frames of the hand are sent.
     closed

@@ -29,7 +29,7 @@ _QUEUE = profile(Qos(2000, reliable=False))
 
 
 class Server:
-    """The program, and what it has said so far."""
+    """The program, and its output so far."""
 
     def __init__(self, folder, environment, *words) -> None:
         self.lines = []
@@ -45,7 +45,7 @@ class Server:
         )
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
-        operate, look_on = (self.said(words) for words in ('operate at', 'look on at'))
+        operate, look_on = (self.printed(words) for words in ('operate at', 'look on at'))
         self.address, _, self.token = operate.split()[-1].partition('/#token=')
         self.viewer_token = look_on.partition('#token=')[2].strip()
 
@@ -55,7 +55,7 @@ class Server:
                 self.lines.append(line)
                 self._news.notify_all()
 
-    def said(self, words) -> str:
+    def printed(self, words) -> str:
         """Wait for a line that begins with certain words."""
 
         def found():
@@ -90,7 +90,7 @@ class ConsoleRig:
     goals, wanted
         Angles of the motors' commands and of the master's, as they came.
     clutches
-        What was said of the clutch.
+        Messages of the clutch.
     """
 
     def __init__(self, folder, *words) -> None:
@@ -121,7 +121,7 @@ class ConsoleRig:
                 lambda data, _: self.clutches.append(deserialize_message(data, Joy).buttons[0]),
                 qos=EVENT,
             )
-            self.server.said('ready')
+            self.server.printed('ready')
             self.until(lambda: self.client.state, 'the graph')
             self.until(lambda: len(self.client.heard_ns) >= 9, 'all nodes')
         except BaseException:
@@ -159,7 +159,7 @@ class ConsoleRig:
         """Start the program anew beside its graph."""
         self.server.end()
         self.server = self._serve()
-        self.server.said('ready')
+        self.server.printed('ready')
 
     def until(self, condition, what='it') -> None:
         """Wait until something has come true."""
@@ -168,7 +168,7 @@ class ConsoleRig:
         )
 
     def passes(self, seconds) -> None:
-        """Let so much simulated time go on, told by the commands of the motors or by the state."""
+        """Let so much simulated time go on, by the commands of the motors or by the state."""
         self.client.wait_until(lambda: False, seconds)
 
     def stands(self) -> bool:

@@ -77,7 +77,7 @@ def bag_of_a_fault(folder):
     return event.close().path
 
 
-def test_the_list_tells_faults_with_time_and_reason(tmp_path, capsys):
+def test_the_list_shows_faults_with_time_and_reason(tmp_path, capsys):
     path = bag_of_a_fault(tmp_path)
     with BagWriter(tmp_path / 'plain.mcap') as writer:
         writer.write_raw('/stream', STRING, encode_string('x'), START - 10**9)
@@ -102,9 +102,9 @@ def test_the_list_tells_faults_with_time_and_reason(tmp_path, capsys):
     assert re.match('recording  2026-09-21T14:13:30 UTC .* live', lines[6])
     assert lines[7:] == ['    being recorded']
     assert main(['bag', 'list', str(tmp_path), '--json']) == 0
-    told = json.loads(capsys.readouterr().out)
+    listed = json.loads(capsys.readouterr().out)
     writer.discard()
-    assert told[2]['events'][0] == {'kind': 'fault', 'at_ns': START + 4999 * MS, 'reason': REASON}
+    assert listed[2]['events'][0] == {'kind': 'fault', 'at_ns': START + 4999 * MS, 'reason': REASON}
 
 
 def test_a_folder_without_recordings_and_none_at_all(tmp_path, capsys):

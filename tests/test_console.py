@@ -86,9 +86,9 @@ def ended(rig, page, act, *reasons):
         follows(rig, page)
         act()
         stopped(rig, page)
-        said = page.state['dead_man']['reason']
-        if said not in BUSY or said in reasons:
-            assert said in reasons
+        reason = page.state['dead_man']['reason']
+        if reason not in BUSY or reason in reasons:
+            assert reason in reasons
             return
         page.sends = True
         page.does(pressed=False, x=0.0, visible=True, focused=True)
@@ -189,14 +189,14 @@ def test_another_server_of_a_page_at_the_handle_is_another_sender(rig):
         rig.until(lambda: rig.handle_senders() == ['console_web'], 'the other one')
         # A server of which nobody knows yet cannot be refused.
         rig.passes(1.0)
-        said = 'console_web speaks for the handle already'
+        why = 'the handle topics are already published by console_web'
 
         def is_refused():
             answer = page.order('claim')
             page.order('release')
-            return said in answer['why']
+            return why in answer['why']
 
-        rig.until(is_refused, said)
+        rig.until(is_refused, why)
         rig.until(lambda: page.state['lease']['holder'] == '', 'no lease')
 
 
@@ -218,7 +218,7 @@ def test_nothing_begins_under_a_hand_and_what_a_page_has_begun_is_paused_when_it
     assert rig.stands()
 
 
-def test_orders_are_said_in_the_graph_with_who_gave_them(rig):
+def test_orders_are_published_in_the_graph_with_who_gave_them(rig):
     with rig.page() as page:
         page.order('claim')
         page.order('set', scale=0.5)
@@ -229,15 +229,15 @@ def test_orders_are_said_in_the_graph_with_who_gave_them(rig):
         page.order('release')
         page.order('state', command='enable')
         rig.until(lambda: rig.orders and rig.orders[-1]['order'] == 'state command enable')
-    said = [(one['order'], one['answer']) for one in rig.orders]
-    assert said[:5] == [
+    answers = [(one['order'], one['answer']) for one in rig.orders]
+    assert answers[:5] == [
         ('claim', 'done'),
         ('set scale 0.5', 'done'),
         ('set scale 1.0', 'done'),
         ('state command home', 'refused'),
         ('lease', 'done'),
     ]
-    assert said[-1] == ('state command enable', 'refused')
+    assert answers[-1] == ('state command enable', 'refused')
     assert rig.orders[0]['operator'] == page.you
     assert CONSOLE_LOG in RECORDED
 
@@ -264,7 +264,7 @@ def place(rig):
 
 
 def greeted(rig, stack):
-    """A socket for commands that has said hello with the operator's token."""
+    """A socket for commands after its hello with the operator's token."""
     url = rig.server.address.replace('http', 'ws', 1)
     opened = stack.enter_context(
         connect(f'{url}/command', origin=rig.server.address, compression=None, max_size=None)
@@ -275,7 +275,7 @@ def greeted(rig, stack):
 
 
 def counted(rig, page, what, at_least=1):
-    """Wait until so many refusals have been told."""
+    """Wait until so many refusals have been counted."""
     name = f'refused: {what}'
     rig.until(lambda: page.state['counters'].get(name, 0) >= at_least, f'{name} in the counters')
 
@@ -294,7 +294,7 @@ def test_what_is_no_frame_and_no_order_and_a_flood_end_their_sender(rig, operato
         for seq in range(3 * FRAMES_A_SECOND)
     ]
     for sent, codes, check in (
-        # Of a sender that goes on sending, TCP may drop what it was told in the end.
+        # Of a sender that goes on sending, TCP may drop the last frames to it.
         ([b'\x02' * _TEN_MEGABYTES], {1009, 1006}, 'frame too large'),
         ([random.Random(1).randbytes(32)], {1008}, 'malformed'),
         (['{"op": "claim"'], {1008}, 'malformed'),
@@ -389,7 +389,7 @@ def test_a_graph_that_is_begun_records_nothing_unasked(tmp_path):
     environment = os.environ | {'ROS_DOMAIN_ID': str(private_domain())}
     server = Server(tmp_path, environment, f'--graph=-p tick_rate:={OPERATED_RATE}')
     try:
-        server.said('ready')
+        server.printed('ready')
         with Page(server.address, server.token) as page:
             assert page.wait(lambda: 'not recording' in str(page.state.get('recorder')))
     finally:

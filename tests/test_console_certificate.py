@@ -70,7 +70,7 @@ def test_what_cannot_be_served_encrypted_is_not_served(tmp_path, capsys):
     certificate, key = certified(tmp_path, 'console')
     _, anothers = certified(tmp_path, 'another')
     _, locked = certified(tmp_path, 'locked', '-passout', 'pass:word')
-    for words, told in (
+    for words, message in (
         (['--host', '192.0.2.1'], 'for all to read'),
         (['--host', '0.0.0.0'], 'give the one address'),
         (['--certificate', certificate], 'belong together'),
@@ -83,5 +83,5 @@ def test_what_cannot_be_served_encrypted_is_not_served(tmp_path, capsys):
         assert main(command) == 2, words
         out, errors = capsys.readouterr()
         assert out == ''
-        assert told in errors, words
+        assert message in errors, words
         assert 'Traceback' not in errors

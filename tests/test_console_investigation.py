@@ -85,14 +85,14 @@ def test_a_recording_is_explained_and_its_report_opens(running, page):
     begun = page.order('explain', bag='sound.mcap', plant='rig.yaml')
     assert begun['ok'], begun
 
-    def told():
+    def entry():
         known = {each['id']: each for each in page.state.get('explanations', [])}
         return known.get(begun['explanation'], {'running': True})
 
-    rig.until(lambda: not told()['running'], 'the explanation')
+    rig.until(lambda: not entry()['running'], 'the explanation')
     found = 'The described plant predicts the recording of bend_x.'
-    assert told()['sentence'] == found, told()
-    with urllib.request.urlopen(rig.server.address + told()['report']) as answer:
+    assert entry()['sentence'] == found, entry()
+    with urllib.request.urlopen(rig.server.address + entry()['report']) as answer:
         assert 'sandbox' in answer.headers['content-security-policy']
         assert found in answer.read().decode()
     assert not page.order('play', explanation=begun['explanation'])['ok']
@@ -101,12 +101,12 @@ def test_a_recording_is_explained_and_its_report_opens(running, page):
 def test_an_experiment_of_an_earlier_explanation_is_played_while_one_holds_on(running, page):
     rig = running
     ready(rig, page)
-    told = {each['bag']: each for each in page.state['explanations']}
-    assert 'why-not/report.json' in told['why-not']['error']
-    assert told['why-it-stops']['sentence'] == 'missing physics: joint_stop (bend_x)'
-    with urllib.request.urlopen(rig.server.address + told['why-it-stops']['report']) as answer:
+    entries = {each['bag']: each for each in page.state['explanations']}
+    assert 'why-not/report.json' in entries['why-not']['error']
+    assert entries['why-it-stops']['sentence'] == 'missing physics: joint_stop (bend_x)'
+    with urllib.request.urlopen(rig.server.address + entries['why-it-stops']['report']) as answer:
         assert answer.read() == b'<p>rivals'
-    answer = page.order('play', explanation=told['why-it-stops']['id'])
+    answer = page.order('play', explanation=entries['why-it-stops']['id'])
     assert answer['ok'], answer
     rig.until(lambda: page.state['playing'] is not None, 'the experiment')
     assert rig.stands()
@@ -126,25 +126,28 @@ def begin(rig, page, **words):
     answer = page.order('investigate', experiments=0, **words)
     assert answer['ok'], answer
     name = answer['investigation']
-    rig.until(lambda: told(page, name)['running'], 'the investigation')
+    rig.until(lambda: investigation(page, name)['running'], 'the investigation')
     return name
 
 
-def told(page, name):
+def investigation(page, name):
     known = {each['id']: each for each in page.state['investigations']}
     return known.get(name, {'running': False})
 
 
 def question(rig, page, name):
-    rig.until(lambda: told(page, name)['question'] or not told(page, name)['running'], 'a question')
-    asked = told(page, name)['question']
-    assert asked, (told(page, name)['error'], told(page, name)['sentence'])
+    rig.until(
+        lambda: investigation(page, name)['question'] or not investigation(page, name)['running'],
+        'a question',
+    )
+    asked = investigation(page, name)['question']
+    assert asked, (investigation(page, name)['error'], investigation(page, name)['sentence'])
     return asked
 
 
 def ended(rig, page, name):
-    rig.until(lambda: not told(page, name)['running'], 'the end')
-    return told(page, name)
+    rig.until(lambda: not investigation(page, name)['running'], 'the end')
+    return investigation(page, name)
 
 
 def holds(rig, page, until):
@@ -218,7 +221,11 @@ def test_one_is_explained_its_plant_shown_by_a_motion_and_adopted_and_undone(run
     assert rig.stands()
     assert page.state['adopted']['words'] != 'no plant has been adopted'
     # The next motion may be asked for at once.
-    holds(rig, page, lambda: told(page, name)['question'] or not told(page, name)['plays'])
+    holds(
+        rig,
+        page,
+        lambda: investigation(page, name)['question'] or not investigation(page, name)['plays'],
+    )
     page.does(pressed=False)
     assert rig.client.state == 'DISABLED'
     assert rig.setting('compensator.mode') == 'bouc_wen'

@@ -73,7 +73,7 @@ def test_every_node_is_seen_with_its_health(console, page):
     expect(page.locator('#clients')).to_contain_text('this page')
 
 
-def test_help_tells_the_keys_and_a_view_that_is_turned_is_turned_back(console, page):
+def test_help_lists_the_keys_and_a_view_that_is_turned_is_turned_back(console, page):
     page.keyboard.press('?')
     expect(page.locator('#help')).to_contain_text('Space')
     page.keyboard.press('Escape')

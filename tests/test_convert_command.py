@@ -16,12 +16,12 @@ TABLE = str(REAL / 'motor_telemetry_single.csv')
 COUNT = 2.0 * np.pi / 4096.0
 
 
-def test_without_a_mapping_columns_are_told_and_nothing_is_written(tmp_path, capsys, monkeypatch):
+def test_without_a_mapping_columns_are_listed_and_nothing_is_written(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(['convert', TABLE]) == 0
-    told = capsys.readouterr().out
-    assert 'target pos (5)' in told
-    assert '--propose' in told
+    output = capsys.readouterr().out
+    assert 'target pos (5)' in output
+    assert '--propose' in output
     assert main(['convert', TABLE, '--out', 'bag']) == 2
     [line] = capsys.readouterr().err.splitlines()
     assert 'bag is not written' in line
@@ -29,7 +29,7 @@ def test_without_a_mapping_columns_are_told_and_nothing_is_written(tmp_path, cap
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_proposal_is_written_once_and_told_as_json(tmp_path, capsys):
+def test_a_proposal_is_written_once_and_shown_as_json(tmp_path, capsys):
     path = tmp_path / 'mapping.yaml'
     assert main(['convert', TABLE, '--propose', str(path), '--json']) == 0
     proposal = json.loads(capsys.readouterr().out)
@@ -92,8 +92,8 @@ def test_a_long_table_takes_little_memory_and_shows_how_far_it_is(tmp_path):
     done = subprocess.run(
         [sys.executable, '-c', code], cwd=tmp_path, capture_output=True, text=True, check=True
     )
-    told, (status, peak_kb) = done.stdout.splitlines()[0], done.stdout.split()[-2:]
-    assert (told, status) == (
+    output, (status, peak_kb) = done.stdout.splitlines()[0], done.stdout.split()[-2:]
+    assert (output, status) == (
         'bag: 300000 messages of 150000 rows',
         '0',
     )

@@ -36,25 +36,25 @@ def operate(graph, *words):
     return status, (out + errors).strip()
 
 
-def test_what_the_supervisor_refuses_is_said_with_its_reason(graph):
+def test_what_the_supervisor_refuses_is_reported_with_its_reason(graph):
     possible = '; possible are enable, disable'
     assert operate(graph, 'pause') == (1, f"pause: 'pause' is not possible in DISABLED{possible}")
     assert operate(graph, 'home') == (1, f"home: 'home' is not possible in DISABLED{possible}")
-    status, said = operate(graph, 'calibrate')
+    status, answer = operate(graph, 'calibrate')
     assert status == 1
-    assert said == 'calibrate: no motion session is open: the slave has to be ENABLED'
+    assert answer == 'calibrate: no motion session is open: the slave has to be ENABLED'
 
 
 def test_enable_is_refused_while_a_cause_is_present(graph):
     graph.set('load_cells', connected=False)
     graph.advance(1.0)
-    status, said = operate(graph, 'enable')
+    status, answer = operate(graph, 'enable')
     assert status == 1
-    assert said.startswith('enable: not enabled: ')
-    assert 'wires/measured_js' in said or 'load_cells' in said
-    status, said = operate(graph, 'status')
+    assert answer.startswith('enable: not enabled: ')
+    assert 'wires/measured_js' in answer or 'load_cells' in answer
+    status, answer = operate(graph, 'status')
     assert status == 0
-    assert 'DISABLED: cannot be enabled: ' in said
+    assert 'DISABLED: cannot be enabled: ' in answer
     graph.set('load_cells', connected=True)
     graph.advance(1.0)
     assert operate(graph, 'enable')[0] == 0
@@ -76,7 +76,7 @@ def test_whoever_interrupts_a_calibration_pauses_the_graph(graph, number):
 
 
 @pytest.mark.parametrize(
-    ('words', 'status', 'said'),
+    ('words', 'status', 'answer'),
     [
         (['get', 'compensator.mod'], 2, 'no parameter compensator.mod; did you mean mode?'),
         (
@@ -91,10 +91,10 @@ def test_whoever_interrupts_a_calibration_pauses_the_graph(graph, number):
         (['set', 'motor_driver.tick_rate', '100'], 1, 'read-only'),
     ],
 )
-def test_wrong_names_and_values_are_told_from_refused_ones(graph, words, status, said):
+def test_wrong_names_and_values_are_distinguished_from_refused_ones(graph, words, status, answer):
     given, text = operate(graph, *words)
     assert given == status, text
-    assert said in text
+    assert answer in text
     assert len(text.splitlines()) == 1
 
 
@@ -105,10 +105,10 @@ def test_the_parameters_of_a_node_are_listed_with_their_values_and_ranges(graph)
     assert '= bouc_wen' in mode
     assert 'physical' in mode
     status, out, _ = graph.run('operate', 'get', 'master', '--json')
-    told = json.loads(out)['parameters']
-    assert told['scale']['value'] == 1.0
-    assert 'from 0.01' in told['scale']['description']
-    assert not [name for name in told if name.startswith('qos_overrides')]
+    parameters = json.loads(out)['parameters']
+    assert parameters['scale']['value'] == 1.0
+    assert 'from 0.01' in parameters['scale']['description']
+    assert not [name for name in parameters if name.startswith('qos_overrides')]
     status, _, errors = graph.run('operate', 'get', 'compensater.mode', timeout=1)
     assert status == 2
     assert errors.strip().endswith('; did you mean compensator?')
@@ -124,9 +124,9 @@ def test_parameters_are_set_by_their_own_type_and_can_be_read_again(graph):
     ):
         node, _, parameter = name.partition('.')
         graph.set(node, **{parameter: before})
-        status, said = operate(graph, 'set', name, text)
-        assert status == 0, said
-        assert said.startswith(f'{name} = ')
+        status, answer = operate(graph, 'set', name, text)
+        assert status == 0, answer
+        assert answer.startswith(f'{name} = ')
         status, out, _ = graph.run('operate', 'get', name, '--json')
         assert status == 0
         assert json.loads(out)['value'] == value
@@ -135,8 +135,8 @@ def test_parameters_are_set_by_their_own_type_and_can_be_read_again(graph):
 
 
 def test_what_only_a_device_can_do_is_refused_by_the_simulated_slave(graph):
-    status, said = operate(graph, 'tare')
-    assert (status, said) == (1, 'tare: simulated cells have no zero to find')
+    status, answer = operate(graph, 'tare')
+    assert (status, answer) == (1, 'tare: simulated cells have no zero to find')
     status, out, errors = graph.run('operate', 'reboot', timeout=1)
     assert (status, out) == (1, '')
     assert errors.startswith('reboot: nobody serves motor/reboot in ')
@@ -147,28 +147,28 @@ def test_a_recording_is_begun_and_ended(graph, tmp_path):
     assert operate(graph, 'record', 'stop') == (1, 'record stop: not recording')
     assert operate(graph, 'set', 'recorder.bag', str(bag))[0] == 0
     assert operate(graph, 'record', 'start') == (0, f'recording to {bag}')
-    status, said = operate(graph, 'record', 'start')
+    status, answer = operate(graph, 'record', 'start')
     assert status == 1
     ends = '`endoscope operate record stop` ends that'
-    assert said.startswith(f'record start: already recording to {bag}: {ends}')
+    assert answer.startswith(f'record start: already recording to {bag}: {ends}')
     assert f'recording to {bag}' in operate(graph, 'status')[1]
-    status, said = operate(graph, 'record', 'stop')
+    status, answer = operate(graph, 'record', 'stop')
     assert status == 0
-    assert said.startswith(f'{bag}: ')
+    assert answer.startswith(f'{bag}: ')
     assert (bag / 'metadata.yaml').is_file()
 
 
 def test_a_moment_is_marked_in_words(graph, tmp_path, capsys):
     assert operate(graph, 'set', 'recorder.bag', str(tmp_path / 'bag'))[0] == 0
-    status, said = operate(graph, 'record', 'mark', 'the wire has slipped')
+    status, answer = operate(graph, 'record', 'mark', 'the wire has slipped')
     assert status == 0
-    path = Path(said.removeprefix('marked: what led to it goes to '))
+    path = Path(answer.removeprefix('marked: what led to it goes to '))
     assert path.parent == tmp_path
     graph.until((path / 'metadata.yaml').is_file, 'the bag')
     assert main(['bag', 'list', str(tmp_path)]) == 0
     assert 'UTC: the wire has slipped' in capsys.readouterr().out
-    status, said = operate(graph, 'record', 'stop')
-    assert (status, said) == (1, 'record stop: not recording')
+    status, answer = operate(graph, 'record', 'stop')
+    assert (status, answer) == (1, 'record stop: not recording')
     assert main(['operate', 'record', 'stop', 'now']) == 2
     assert 'record stop takes no text; record mark does' in capsys.readouterr().err
 
@@ -181,11 +181,11 @@ def test_status_names_every_node_and_the_source_of_the_master(graph):
     assert lines['master'].split()[1:] == ['source', 'none'] or 'ok' in lines['master']
     for name in graph.nodes:
         assert name in out or name == 'simulation_clock'
-    said = json.loads(graph.run('operate', 'status', '--json')[1])
-    assert said['state'] == 'DISABLED'
-    assert said['master_source'] == 'none'
-    assert said['not_heard'] == []
-    assert set(said['nodes']) >= {'supervisor: operating state', 'calibration: procedure'}
+    answer = json.loads(graph.run('operate', 'status', '--json')[1])
+    assert answer['state'] == 'DISABLED'
+    assert answer['master_source'] == 'none'
+    assert answer['not_heard'] == []
+    assert set(answer['nodes']) >= {'supervisor: operating state', 'calibration: procedure'}
 
 
 @pytest.mark.parametrize('words', [['status'], ['get', 'master.scale'], ['calibrate']])

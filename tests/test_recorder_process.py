@@ -124,7 +124,7 @@ def test_a_killed_recorder_leaves_all_but_the_last_second(tmp_path):
         assert sum(1 for _ in reader.messages(connections)) == len(series)
 
 
-def test_a_full_disk_is_said_and_survived(tmp_path):
+def test_a_full_disk_is_reported_and_survived(tmp_path):
     with RecorderProcess(tmp_path / 'bag') as recorder:
         recorder.send(300)
         limit = (200_000, resource.RLIM_INFINITY)
@@ -167,32 +167,32 @@ def test_losses_are_counted_exactly_and_exit_1(tmp_path):
 
 
 def _ended_after_a_while(argv, words):
-    """Run a program until it has said something, interrupt it, and return all that it said."""
+    """Run a program until its first matching line, interrupt it, and return all its output."""
     process = subprocess.Popen(
         [sys.executable, '-m', 'endoscope_bringup.cli', *argv],
         env=os.environ | {'ROS_DOMAIN_ID': str(private_domain())},
         stderr=subprocess.PIPE,
         text=True,
     )
-    said = ''
+    output = ''
     try:
         for line in process.stderr:
-            said += line
+            output += line
             if words in line:
                 break
         process.send_signal(signal.SIGTERM)
-        said += process.communicate(timeout=60)[1]
+        output += process.communicate(timeout=60)[1]
     finally:
         process.kill()
         process.communicate()
-    return process.returncode, said
+    return process.returncode, output
 
 
-def test_topics_on_which_nothing_comes_are_said_at_once_and_at_the_end(tmp_path):
+def test_topics_on_which_nothing_comes_are_reported_at_once_and_at_the_end(tmp_path):
     argv = ['record', '--out', str(tmp_path / 'bag'), '--topics', 'foo', 'wires/measured_js']
-    code, said = _ended_after_a_while(argv, 'nobody publishes /endoscope/foo')
+    code, output = _ended_after_a_while(argv, 'nobody publishes /endoscope/foo')
     assert code == 0
-    assert 'no message came on /endoscope/wires/measured_js, foo' in said
+    assert 'no message came on /endoscope/wires/measured_js, foo' in output
 
 
 def test_a_replay_says_how_far_it_came(tmp_path):
@@ -202,9 +202,9 @@ def test_a_replay_says_how_far_it_came(tmp_path):
             cdr = encode_joint_state(['motor_x'], stamp, position=[0.0])
             writer.write_raw(TOPIC, 'sensor_msgs/msg/JointState', cdr, stamp)
     bag = str(tmp_path / 'bag')
-    code, said = _ended_after_a_while(['replay', bag, '--delay', '0'], 'times its pace')
+    code, output = _ended_after_a_while(['replay', bag, '--delay', '0'], 'times its pace')
     assert code == 0
-    assert re.search(rf'stopped: {bag}: \d+ messages, \d+\.\d s of 2000 replayed', said)
-    code, said = _ended_after_a_while(['replay', bag, '--speed', '100'], 'replayed')
+    assert re.search(rf'stopped: {bag}: \d+ messages, \d+\.\d s of 2000 replayed', output)
+    code, output = _ended_after_a_while(['replay', bag, '--speed', '100'], 'replayed')
     assert code == 0
-    assert f'{bag}: 2000 messages, 20.0 s replayed' in said.splitlines()[-1]
+    assert f'{bag}: 2000 messages, 20.0 s replayed' in output.splitlines()[-1]

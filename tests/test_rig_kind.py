@@ -71,11 +71,11 @@ def bag_that_says(path, *texts):
     return path
 
 
-def test_info_tells_it_and_what_does_not_say_or_decode_is_unknown(tmp_path, capsys):
-    said = bag_that_says(tmp_path / 'said', 'kind: real', 'kind: emulated\nprogram: endoscope 1')
-    assert main(['bag', 'info', str(said), '--json']) == 0
+def test_info_shows_it_and_what_is_missing_or_malformed_is_unknown(tmp_path, capsys):
+    bag = bag_that_says(tmp_path / 'stated', 'kind: real', 'kind: emulated\nprogram: endoscope 1')
+    assert main(['bag', 'info', str(bag), '--json']) == 0
     assert json.loads(capsys.readouterr().out)['rig']['kind'] == 'emulated'
-    assert main(['bag', 'info', str(said)]) == 0
+    assert main(['bag', 'info', str(bag)]) == 0
     assert 'rig: emulated (endoscope 1)\n' in capsys.readouterr().out
     spoilt = tmp_path / 'spoilt'
     with BagWriter(spoilt) as writer:

@@ -199,7 +199,7 @@ def test_another_handle_is_left_alone(graph):
     publisher = graph.speak(Joy, MASTER_CLUTCH, EVENT)
     with Typist(graph, '--take') as typist:
         assert typist.end() == 1
-        assert 'probe speaks for the handle already' in typist.text
+        assert 'the handle topics are already published by probe' in typist.text
         assert graph.nodes['master'].get_parameter('source').value == 'none'
     graph.probe.destroy_publisher(publisher)
 

@@ -1,4 +1,4 @@
-"""The watch among the real nodes: quiet on a rig as described, and it tells of one that changes."""
+"""The watch among the real nodes: quiet on a rig as described, and it reports one that changes."""
 
 import json
 import re
@@ -44,7 +44,7 @@ def files(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def watched(files):
-    """The graph with a watch that has told of the change; what it said before and after."""
+    """The graph with a watch that has reported the change; its status before and after."""
     overrides = {
         'watch': {'active': True, 'plant': str(files / 'described.yaml')},
         'motor_driver': {'plant_file': str(files / 'true.yaml')},
@@ -64,7 +64,7 @@ def watched(files):
         yield graph, before
 
 
-def said(status):
+def content(status):
     return status.level, status.message, {v.key: v.value for v in status.values}
 
 
@@ -75,31 +75,31 @@ def restarted(graph):
     return future.result()
 
 
-def test_nothing_is_told_before_anything_has_changed(watched):
-    level, message, values = said(watched[1])
+def test_nothing_is_reported_before_anything_has_changed(watched):
+    level, message, values = content(watched[1])
     assert level == OK
     assert message.startswith('the rig is as described')
     assert float(values['margin']) < 1.0
     assert float(values['bend_x learnt [s]']) == 20.0
 
 
-def test_a_tube_that_is_bent_more_is_told_with_stage_and_time(watched):
+def test_a_tube_that_is_bent_more_is_reported_with_stage_and_time(watched):
     graph, _ = watched
-    level, message, values = said(graph.diagnostics['watch: rig'][-1])
+    level, message, values = content(graph.diagnostics['watch: rig'][-1])
     assert level == WARN
-    assert message.startswith('bend_x is not as described any more: sheath')
+    assert message.startswith('bend_x no longer matches its plant: sheath')
     assert values['bend_x stage'].split(' or ')[0] == 'sheath'
     assert float(values['bend_x margin']) >= 1.0
     assert 'bend_y stage' not in values
-    told = graph.nodes['watch'].rig_watch.alarms[0]
-    assert told.at < CHANGED_AT + 10.0
-    assert told.since == pytest.approx(CHANGED_AT, abs=3.0)
+    alarm = graph.nodes['watch'].rig_watch.alarms[0]
+    assert alarm.at < CHANGED_AT + 10.0
+    assert alarm.since == pytest.approx(CHANGED_AT, abs=3.0)
 
 
 def test_the_bag_of_an_alarm_begins_before_the_change_and_can_be_explained(watched, files):
     [path] = event_bags(files)
     [event] = events_of(open_bag(path).metadata)
-    assert event.reason.startswith('watch: bend_x is not as described any more: sheath')
+    assert event.reason.startswith('watch: bend_x no longer matches its plant: sheath')
     recording = recording_from_bag(path, PlantDescription())
     assert recording.duration > 45.0
 
@@ -111,7 +111,7 @@ def test_an_adopted_plant_is_the_one_that_is_compared_from_then_on(watched, file
     status, out, errors = graph.run('operate', 'adopt', str(files / 'described.yaml'), '--json')
     assert status == 0, out + errors
     graph.advance(2.0)
-    level, message, values = said(graph.diagnostics['watch: rig'][-1])
+    level, message, values = content(graph.diagnostics['watch: rig'][-1])
     assert level == OK
     assert message.startswith('learning, 0 of 30 s')
     assert values['plant'] == f'adopted plant {json.loads(out)["plant"]}'
@@ -132,7 +132,7 @@ def test_messages_that_are_no_readings_are_counted_and_change_nothing(watched):
     stranger = graph.speak(JointState, SLAVE_MEASURED, SENSOR_OFFERED)
     stranger.publish(encode_joint_state(['elbow'], 0, position=[1.0]))
     graph.advance(2.0)
-    level, _, values = said(graph.diagnostics['watch: rig'][-1])
+    level, _, values = content(graph.diagnostics['watch: rig'][-1])
     assert level == OK
     assert int(values['tracker unreadable']) >= 1
 
@@ -145,7 +145,7 @@ def test_it_starts_by_the_documented_line():
     with SimulatedGraph(args=line.split(), extra=(WatchNode,)) as graph:
         assert graph.nodes['watch'].announcement.startswith('watching for a rig other than')
         graph.advance(2.0)
-        assert said(graph.diagnostics['watch: rig'][-1])[1].startswith('learning, 0 of 30 s')
+        assert content(graph.diagnostics['watch: rig'][-1])[1].startswith('learning, 0 of 30 s')
         with GraphClient(graph.probe, graph.advance) as client:
             client.find(1.0)
             lines, _ = status_of(client, 3.0)
@@ -158,7 +158,7 @@ def test_by_default_it_is_there_and_hears_nothing():
     with SimulatedGraph(extra=(WatchNode,)) as graph:
         graph.enable()
         graph.advance(1.2)
-        assert said(graph.diagnostics['watch: rig'][-1]) == (OK, 'off', {})
+        assert content(graph.diagnostics['watch: rig'][-1]) == (OK, 'off', {})
         assert graph.nodes['watch'].extra_readers() == []
         answer = restarted(graph)
     assert not answer.success

@@ -36,7 +36,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    # Whoever needs one room of the package does not wait for numpy and mcap of the others.
+    # Importing one module does not load numpy and mcap for the others.
     if name in _HOME:
         return getattr(import_module(f'endoscope_bags.{_HOME[name]}'), name)
     raise AttributeError(f'module {__name__!r} has no attribute {name!r}')

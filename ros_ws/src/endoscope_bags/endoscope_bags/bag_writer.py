@@ -76,8 +76,8 @@ class BagWriter:
     path
         Folder ``NAME`` (holding ``NAME_0.mcap`` and ``metadata.yaml``) or file ``NAME.mcap``.
     atomic
-        Write under a temporary name and take the final one on closing. A recorder does not want
-        that: what it leaves when it is killed shall be found.
+        Write under a temporary name and take the final one on closing. Recorders do without: what
+        they leave when they are killed must be found.
     chunk_seconds, chunk_bytes
         A chunk is closed when it spans this time or exceeds this size, whatever comes first.
     threaded
@@ -97,7 +97,7 @@ class BagWriter:
     BagExistsError
         Something is there already.
     BagWriteError
-        The place cannot be written to, or has no room even for the beginning.
+        The place cannot be written to, or not even the beginning fits.
     """
 
     def __init__(
@@ -149,7 +149,7 @@ class BagWriter:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Messages accepted so far, by topic; those of a chunk that found no room are taken off."""
+        """Messages accepted so far, by topic; those of a chunk that did not fit are subtracted."""
         lost = self._sink.lost_counts
         return {t: n - lost.get(self._topics[t].id, 0) for t, n in self._counts.items()}
 
@@ -275,7 +275,7 @@ class BagWriter:
         Raises
         ------
         BagWriteError
-            There was no room for this chunk or, when threaded, for one before; its messages are
+            This chunk or, when threaded, one before did not fit on the disk; its messages are
             dropped and no longer counted.
         """
         pending, self._pending = self._pending, []
@@ -285,7 +285,7 @@ class BagWriter:
             self._sink.write(topics, pending, size)
 
     def settle(self) -> None:
-        """Flush, and wait until everything is in the file or has found no room.
+        """Flush, and wait until everything is in the file or did not fit.
 
         Raises
         ------
@@ -308,7 +308,7 @@ class BagWriter:
         Raises
         ------
         BagWriteError
-            The last chunk, or the index, had no room. The recording is finished all the same in
+            The last chunk, or the index, did not fit. The recording is finished all the same in
             the first case, and can be recovered in the second.
         """
         if self.closed:

@@ -1,4 +1,4 @@
-"""Takes chunks of messages and puts them into the file of a recording, in a thread if asked."""
+"""Writes chunks of messages to the file of a recording, in a thread on request."""
 
 import errno
 import fcntl
@@ -47,7 +47,7 @@ def write_error(error: OSError, name: str) -> BagWriteError:
 
 
 def is_being_written(path: Path) -> bool:
-    """Tell whether a `ChunkSink`, of whatever process, has a file open."""
+    """Return whether a `ChunkSink` of any process has a file open."""
     with path.open('rb') as file:
         try:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -74,7 +74,7 @@ class ChunkSink:
     def __init__(
         self, path: Path, records: Mapping[str, dict[str, str]], *, threaded: bool
     ) -> None:
-        self.lost_counts: Counter[int] = Counter()  # by topic id, of the chunks that found no room
+        self.lost_counts: Counter[int] = Counter()  # by topic id, of the chunks that did not fit
         self.start_ns = 0  # first receipt; 0, like the last in `end_ns`, while the file is empty
         self.end_ns = 0
         self._path = path
@@ -171,7 +171,7 @@ class ChunkSink:
         self._n_chunks += 1
 
     def _require_room(self, size: int) -> None:
-        # Asked for before a chunk is written, with room for the summary, so that a file on a full
+        # Checked before a chunk is written, with space for the summary, so that a file on a full
         # disk can always be finished.
         per_chunk = _CHUNK_OVERHEAD + 10 * self._n_topics
         summary = per_chunk * (self._n_chunks + 2) + _TOPIC_OVERHEAD * (self._n_topics + 2)

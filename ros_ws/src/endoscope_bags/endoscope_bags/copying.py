@@ -1,4 +1,4 @@
-"""New recordings out of old ones: a stretch with what was in force then, or what is sound."""
+"""New recordings out of old ones: a time span with its latched messages, or the sound part."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from pathlib import Path
 
 from endoscope_bags.bag_writer import BagWriter
 from endoscope_bags.errors import BagError
-from endoscope_bags.information import LOST_PREFIX, losses_told
+from endoscope_bags.information import LOST_PREFIX, counted_losses
 from endoscope_bags.message_types import MessageType
 from endoscope_bags.recording import Recording, copied_records, open_bag
 from endoscope_bags.sequence_gaps import SequenceGaps
@@ -56,7 +56,7 @@ def cut(source: str | Path, target: str | Path, begin: float, end: float | None)
                 in_force[message.topic] = message
         for message in in_force.values():
             write(message._replace(log_ns=first_ns))
-        numbers = {topic: SequenceGaps() for topic in losses_told(recording)}
+        numbers = {topic: SequenceGaps() for topic in counted_losses(recording)}
         for message in recording.messages():
             if first_ns <= message.log_ns <= last_ns:
                 write(message)

@@ -168,7 +168,7 @@ def date_ns(text: str) -> int:
 
 
 def reads_as(read: Callable[[str], object], cell: str) -> bool:
-    """Tell whether a cell reads as a number (`float`: NaN is one) or as a date (`date_ns`)."""
+    """Return whether a cell parses as a number (`float`, NaN included) or a date (`date_ns`)."""
     try:
         read(cell)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Everything that can be wrong with a recording, under one base class."""
+"""Errors of recordings, under one base class."""
 
 from endoscope_core.errors import EndoscopeError
 
@@ -16,11 +16,11 @@ class CorruptBagError(BagError):
 
 
 class BagExistsError(BagError, FileExistsError):
-    """The place that a recording should go to is taken; nothing is ever overwritten."""
+    """The target of a recording exists already; nothing is ever overwritten."""
 
 
 class BagWriteError(BagError):
-    """The disk does not take the recording; what was recorded until then is kept."""
+    """The recording cannot be written on; what was recorded until then is kept."""
 
 
 class MalformedMessageError(BagError):

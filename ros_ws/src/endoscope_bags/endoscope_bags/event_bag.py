@@ -1,7 +1,7 @@
-"""Bags of events: what came before and after a fault or an operator's mark, and why they are kept.
+"""Event bags: the seconds before and after a fault or an operator's mark, with the reason.
 
-The reason stands in a metadata record before all messages, which a bag that is cut off has too, and
-with whatever else happened meanwhile among the notes at its end.
+The reason is in a metadata record before all messages, so that a truncated bag has it too, and,
+with all events of that time, among the notes at its end.
 """
 
 import re
@@ -24,7 +24,7 @@ _NAME = re.compile(rf'({FAULT}|{MARK})-[0-9]{{8}}-[0-9]{{6}}Z(-[0-9]+)?')
 _EVENT = re.compile(rf'({FAULT}|{MARK}) at (\S+) UTC: (.*)', re.DOTALL)
 _NOTE = 'event '
 _WRITTEN_AT_A_TIME = 40
-"""Messages; a few times as many as arrive meanwhile, and little of a tick."""
+"""Messages; a few times as many as arrive per tick, at little cost."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Event:
 
     kind: str  # `FAULT` or `MARK`
     at_ns: int  # since the epoch, by the clock of the recording
-    reason: str  # in words; of a mark what the operator said
+    reason: str  # in words; of a mark the operator's text
 
     def __str__(self) -> str:
         return f'{self.kind} at {np.datetime64(self.at_ns, "ns")} UTC: {self.reason}'
@@ -55,9 +55,9 @@ def event_from_text(text: str) -> Event | None:
 def events_of(metadata: Mapping[str, Mapping[str, str]]) -> list[Event]:
     """Return the events of a bag's metadata records, first to last."""
     notes = metadata.get(METADATA_RECORD, {})
-    told = [text for key, text in notes.items() if key.startswith(_NOTE)]
-    told = told or list(metadata.get(EVENT_RECORD, {}).values())
-    return [event for event in map(event_from_text, told) if event is not None]
+    texts = [text for key, text in notes.items() if key.startswith(_NOTE)]
+    texts = texts or list(metadata.get(EVENT_RECORD, {}).values())
+    return [event for event in map(event_from_text, texts) if event is not None]
 
 
 def event_bags(folder: Path) -> list[Path]:
@@ -67,9 +67,9 @@ def event_bags(folder: Path) -> list[Path]:
 
 
 def new_event_bag(folder: Path, kind: str, most: int) -> Path:
-    """Return where the bag of an event goes; BagError if `most` of them are there already.
+    """Return the path for the bag of an event; BagError if there are `most` of them already.
 
-    None is ever deleted to make room: somebody has to read it first.
+    Old bags are never deleted automatically.
     """
     if len(event_bags(folder)) >= most:
         raise BagError(
@@ -86,9 +86,9 @@ def new_event_bag(folder: Path, kind: str, most: int) -> Path:
 class EventBag:
     """One bag of an event, from the event to its end.
 
-    The messages before are those of the ring at the event. A few of them are written each time
-    something arrives, so that nobody waits. The bag is begun with its reason known, or when
-    `begin` is called.
+    The messages before it are those in the ring buffer at the event. A few of them are written
+    whenever messages arrive, so that no caller waits. Writing starts with `begin`, as a rule once
+    the reason is known.
     """
 
     def __init__(self, recent: RecentMessages, kind: str, at_ns: int, reason: str = '') -> None:
@@ -112,7 +112,7 @@ class EventBag:
         self.events.append(Event(kind, at_ns, reason))
 
     def explain(self, reason: str) -> None:
-        """Say why the last event that has no reason took place."""
+        """Set the reason of the last event that has none."""
         for index in reversed(range(len(self.events))):
             event = self.events[index]
             if not event.reason:
@@ -131,7 +131,7 @@ class EventBag:
         self.session.accept(held_since(self._before, since_ns))
 
     def arrive(self, piece: bytes, count: int) -> None:
-        """Take what arrived, `count` messages, and write as many and some more of what waits."""
+        """Queue `count` messages that arrived, and write as many of the queue and a few more."""
         if piece:
             self._waiting.append(piece)
         if self.session is not None:
@@ -151,7 +151,7 @@ class EventBag:
         return self.session is not None and not self._waiting
 
     def close(self) -> SessionReport:
-        """Write what waits, and finish the bag with all that happened in its notes."""
+        """Write the rest of the queue, and finish the bag with all its events in the notes."""
         assert self.session is not None
         self._write(float('inf'))
         notes = {f'{_NOTE}{n}': str(event) for n, event in enumerate(self.events, start=1)}

@@ -39,19 +39,19 @@ class TopicInformation:
     rate_hz: float | None
     duration_s: float  # first to last message
     # Silences longer than 2.5 periods, by header stamp (by publication where there is none), in
-    # which nothing was published: the numbers of the messages go on, or the topic is latched and
-    # has news now and then.
+    # which nothing was published: the sequence numbers are consecutive, or the topic is latched and
+    # published on change.
     pauses: int
     paused_s: float  # total of the pauses, each less one period
     gaps: int  # silences in which messages were lost or, where nothing numbers them, may have been
     missing_s: float  # total of the gaps, each less one period
     longest_silence_s: float | None  # None for fewer than two messages
-    lost: int | None  # published, but not arrived; None where the recorder did not tell
+    lost: int | None  # published, but not arrived; None where the recorder did not count
 
 
 @dataclass(frozen=True)
 class BagInformation:
-    """A recording at a glance; prints itself as a table."""
+    """Summary of a recording; its text is a table."""
 
     path: str
     library: str  # the program that wrote it
@@ -133,8 +133,8 @@ def _counted(silences: int, seconds: float) -> str:
     return f'{silences} ({seconds:.3f} s)' if silences else '0'
 
 
-def losses_told(recording: Recording) -> dict[str, int]:
-    """Messages that were published and not recorded by topic, of topics whose recorder counted."""
+def counted_losses(recording: Recording) -> dict[str, int]:
+    """Messages that were published and not recorded, by topic, where the recorder counted them."""
     return {
         key.removeprefix(LOST_PREFIX): int(text)
         for key, text in recording.metadata.get(METADATA_RECORD, {}).items()
@@ -143,8 +143,8 @@ def losses_told(recording: Recording) -> dict[str, int]:
 
 
 def bag_information(recording: Recording) -> BagInformation:
-    """Look through a recording that was opened with `open_bag`."""
-    lost = losses_told(recording)
+    """Summarise a recording that was opened with `open_bag`."""
+    lost = counted_losses(recording)
     notes = {
         key: text
         for key, text in recording.metadata.get(METADATA_RECORD, {}).items()

@@ -37,21 +37,20 @@ class BagEntry:
         return {**vars(self), 'events': [vars(event) for event in self.events]}
 
     def lines(self) -> list[str]:
-        """Say it: one line, and one for each event or trouble."""
+        """Return it as text: one line, and one for each event or error."""
         second = np.datetime64(self.start_ns, 'ns').astype('datetime64[s]')
         begin = f'{second} UTC' if self.start_ns else '-'
         size = f'{self.duration_s:10.3f} s  {self.size / 1e6:9.2f} MB'
-        told = [f'{self.kind:9}  {begin:23}  {size}  {self.name}']
-        told += [f'    {event}' for event in self.events]
-        return told + ([f'    {self.trouble}'] if self.trouble else [])
+        text = [f'{self.kind:9}  {begin:23}  {size}  {self.name}']
+        text += [f'    {event}' for event in self.events]
+        return text + ([f'    {self.trouble}'] if self.trouble else [])
 
 
 def bags_in(folder: Path) -> list[BagEntry]:
-    """Look into all recordings of a folder, oldest first.
+    """List all recordings of a folder, oldest first.
 
-    Of a recording that was finished the summary is read, and what is damaged before it is not
-    noticed. BagNotFoundError if there is no such folder; a recording that cannot be read is listed
-    with why.
+    Of a finished recording only the summary is read, so that damage before it is not noticed.
+    BagNotFoundError if there is no such folder; an unreadable recording is listed with its error.
     """
     if not folder.is_dir():
         raise BagNotFoundError(f'{folder}: no such folder')
@@ -73,18 +72,18 @@ def _entry(path: Path) -> BagEntry:
         files = bag_files(path)
         size = sum(file.stat().st_size for file in files)
         being_recorded = any(map(is_being_written, files))
-        told = _summary(files)
-        if told is None:
-            told, trouble = _read_whole(path)
+        summary = _summary(files)
+        if summary is None:
+            summary, trouble = _read_whole(path)
     except (EndoscopeError, OSError) as error:
         trouble = BEING_RECORDED if being_recorded else str(error)
         return BagEntry(path.name, RECORDING, 0, 0.0, size, (), trouble)
-    events = tuple(events_of(told.metadata))
+    events = tuple(events_of(summary.metadata))
     return BagEntry(
         path.name,
         events[0].kind if events else RECORDING,
-        told.start_ns,
-        (told.end_ns - told.start_ns) * 1e-9,
+        summary.start_ns,
+        (summary.end_ns - summary.start_ns) * 1e-9,
         size,
         events,
         BEING_RECORDED if being_recorded else trouble,
@@ -92,9 +91,9 @@ def _entry(path: Path) -> BagEntry:
 
 
 def _summary(files: Sequence[Path]) -> McapSummary | None:
-    """What the summaries of all files say together; None where one has none."""
-    told = [read_summary(file) for file in files]
-    found = [each for each in told if each is not None]
+    """Combined summary of all files; None where one has none."""
+    summaries = [read_summary(file) for file in files]
+    found = [each for each in summaries if each is not None]
     if len(found) < len(files):
         return None
     return McapSummary(
@@ -105,12 +104,12 @@ def _summary(files: Sequence[Path]) -> McapSummary | None:
 
 
 def _read_whole(path: Path) -> tuple[McapSummary, str]:
-    """The same of a recording without a summary, and what is wrong with it."""
+    """Summary of a recording without one, and its error."""
     trouble = ''
     try:
         recording = open_bag(path)
     except BagError as error:
-        # A recorder that was killed has left a reason, and what came before it.
+        # A recorder that was killed has left the reason of an event, and the messages before it.
         trouble = str(error)
         recording = open_bag(path, salvage=True)
     return McapSummary(recording.start_ns, recording.end_ns, recording.metadata), trouble

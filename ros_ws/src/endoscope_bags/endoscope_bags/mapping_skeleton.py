@@ -1,4 +1,4 @@
-"""What is in an unknown table, and a mapping for a person to fill in: `convert --propose`."""
+"""Description of an unknown table, and a mapping to fill in: `convert --propose`."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -82,7 +82,7 @@ class TableDescription:
 
 
 def described_table(text: DelimitedText) -> TableDescription:
-    """Look at all columns that the first row has."""
+    """Describe all columns of the first row."""
     _, row = next(text.rows())
     columns = tuple(_column(text, index, cell) for index, cell in enumerate(row))
     return TableDescription(

@@ -26,7 +26,7 @@ MESSAGE_HEAD_LENGTH = MESSAGE_HEAD.itemsize - RECORD_HEAD.size
 
 
 class ExactStream(ReadDataStream):
-    """A stream of one record that ends nowhere but where the record does."""
+    """A stream of exactly one record."""
 
     def __init__(self, body: bytes) -> None:
         super().__init__(BytesIO(body))

@@ -39,7 +39,7 @@ IntArray = npt.NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Messages:
-    """Where N messages are and what their heads say, in file order; every array is (N,) int64."""
+    """Places and heads of N messages, in file order; every array is (N,) int64."""
 
     channel: IntArray
     sequence: IntArray
@@ -61,7 +61,7 @@ class Messages:
 
 @dataclass
 class McapScan:
-    """What one pass over a file found."""
+    """Result of one pass over a file."""
 
     path: Path
     # Its first record (profile and library).
@@ -140,7 +140,7 @@ class _Pass:
         self._summary_holds = False
         self._corrupt = False  # beyond that the end of the file is missing
         self._n_chunks = 0
-        # Channels that the checksum of a chunk vouches for.
+        # Channels that are covered by the checksum of a chunk.
         self._in_chunks: set[int] = set()
         self._heads: list[npt.NDArray[np.void]] = []
         self._starts: list[IntArray] = []
@@ -160,7 +160,7 @@ class _Pass:
                 break
             opcode, start, stop = record
             if opcode == Opcode.MESSAGE and self._salvage and self._n_chunks:
-                # Behind a length that lies: a piece of a chunk, which no checksum covers.
+                # Behind a wrong length: a piece of a chunk, which no checksum covers.
                 self._damaged(f'a message by itself at byte {start}')
             elif opcode == Opcode.MESSAGE and stop - start >= MESSAGE_HEAD_LENGTH:
                 self._loose.append(position)
@@ -257,13 +257,13 @@ class _Pass:
                 self._damaged('the summary does not agree with its checksum')
 
     def _settle(self) -> None:
-        """Put together what data and summary say; where they differ, by which checksum holds."""
+        """Merge data and summary; where they differ, the one whose checksum holds counts."""
         written, summary = self._written, self._summary
         for kind in ('schemas', 'channels'):
-            told, again = getattr(written, kind), getattr(summary, kind)
-            for number in told.keys() & again.keys():
-                if told[number] != again[number]:
-                    self._damaged(f'{kind[:-1]} {number} is another in the summary')
+            first_time, again = getattr(written, kind), getattr(summary, kind)
+            for number in first_time.keys() & again.keys():
+                if first_time[number] != again[number]:
+                    self._damaged(f'{kind[:-1]} {number} differs in the summary')
         first, second = (written, summary) if self._summary_holds else (summary, written)
         self.scan.schemas = first.schemas | second.schemas
         self.scan.channels = first.channels | second.channels

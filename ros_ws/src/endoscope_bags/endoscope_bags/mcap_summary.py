@@ -1,4 +1,4 @@
-"""What the summary at the end of an MCAP file says of the rest: span of time and metadata."""
+"""Time span and metadata of an MCAP file, from the summary at its end."""
 
 import os
 import struct
@@ -21,7 +21,7 @@ _LATEST_NS = 1 << 63
 
 @dataclass(frozen=True)
 class McapSummary:
-    """A file at a glance; nothing is known of whether its chunks are sound."""
+    """Summary of a file; whether its chunks are sound is not known."""
 
     start_ns: int  # first and last receipt, since the epoch
     end_ns: int
@@ -29,7 +29,7 @@ class McapSummary:
 
 
 def read_summary(path: Path) -> McapSummary | None:
-    """Read the summary of a file; None where it has none that is sound, counts and has messages."""
+    """Read the summary of a file; None without a sound one that counts at least one message."""
     with path.open('rb') as file:
         try:
             return _summary(file)

@@ -57,7 +57,7 @@ def typestore() -> Typestore:
 
 
 def begins_with_header(definition: str) -> bool:
-    """Tell whether the first field of a type is a ``std_msgs/Header``."""
+    """Return whether the first field of a type is a ``std_msgs/Header``."""
     for line in definition.splitlines():
         code = line.partition('#')[0].split()
         if code and '=' not in line.partition('#')[0]:

@@ -1,4 +1,4 @@
-"""The `metadata.yaml` of a rosbag2 folder: which files make a recording, and what is said of them.
+"""The `metadata.yaml` of a rosbag2 folder: the files of a recording and their summary.
 
 It is written in version 9 (ROS 2 Jazzy), with every key that it has.
 """
@@ -92,7 +92,7 @@ def _in_sqlite3(path: Path) -> BagError:
 
 @dataclass(frozen=True)
 class TopicSummary:
-    """What the metadata say of one topic."""
+    """Metadata of one topic."""
 
     name: str
     type: MessageType

@@ -1,4 +1,4 @@
-"""The last messages of all topics in memory, bounded in age and size, and what was in force before.
+"""Ring buffer of the last messages of all topics, bounded in age and size, with latched ones.
 
 A thousand ticks a second leave some 90 000 messages in 20 s. As objects they would be walked over
 by each garbage collection and take three times their size, so those that came together are one
@@ -16,7 +16,7 @@ _SECOND = 1_000_000_000
 
 
 def packed(batch: Sequence[Arrival]) -> bytes:
-    """Put arrivals into one piece of bytes."""
+    """Serialise arrivals into one piece of bytes."""
     pack = _HEAD.pack
     return b''.join(
         [
@@ -31,7 +31,7 @@ def packed(batch: Sequence[Arrival]) -> bytes:
 
 
 def unpacked(piece: bytes) -> Iterator[Arrival]:
-    """Give the arrivals that `packed` put together."""
+    """Return the arrivals that `packed` serialised."""
     place = 0
     while place < len(piece):
         received_ns, topic, sequence, published_ns, size = _HEAD.unpack_from(piece, place)
@@ -41,17 +41,17 @@ def unpacked(piece: bytes) -> Iterator[Arrival]:
 
 
 class RecentMessages:
-    """Messages of the last `seconds`, of at most `room` bytes with those that were in force.
+    """Messages of the last `seconds`, of at most `capacity` bytes with those that were in force.
 
     Of a topic whose last message holds until the next one, the last before these is kept too; with
     0 seconds nothing else is.
     """
 
-    def __init__(self, seconds: float, room: int) -> None:
-        self.size = 0  # bytes, never more than the room
-        self.left_out = 0  # messages that alone are larger than the room
+    def __init__(self, seconds: float, capacity: int) -> None:
+        self.size = 0  # bytes, never more than the capacity
+        self.left_out = 0  # messages that alone are larger than the capacity
         self._age_ns = round(seconds * _SECOND)
-        self._room = room
+        self._capacity = capacity
         # When the last of them came, all of them, and those among them that hold until the next.
         self._pieces: deque[tuple[int, bytes, tuple[Arrival, ...]]] = deque()
         self._before: dict[int, Arrival] = {}  # by topic, from before all pieces
@@ -67,7 +67,7 @@ class RecentMessages:
             return
         piece = packed(batch)
         size = len(piece) + sum(len(arrival.data) for arrival in held)
-        if size > self._room:
+        if size > self._capacity:
             if len(batch) == 1:
                 self.left_out += 1
                 return
@@ -76,7 +76,7 @@ class RecentMessages:
             return
         self._pieces.append((max(arrival.received_ns for arrival in batch), piece, held))
         self.size += size
-        while self.size > self._room:
+        while self.size > self._capacity:
             if len(self._pieces) > 1:
                 self._drop_first()
             else:

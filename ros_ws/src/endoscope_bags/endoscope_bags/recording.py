@@ -1,4 +1,4 @@
-"""Reading recordings: `open_bag`, and what one can ask of what it returns."""
+"""Reading recordings: `open_bag`, and the `Recording` that it returns."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -35,7 +35,7 @@ IntArray = npt.NDArray[np.int64]
 _NAME, _KEY = 'endoscope_rig', 'rig.yaml'
 """Of the metadata record, which stands before all messages."""
 EVENT_RECORD = 'endoscope_event'
-"""Of the one that says why a bag was kept, of a fault or of an operator's mark."""
+"""Of the record with the reason of an event bag: a fault or an operator's mark."""
 
 
 @contextmanager
@@ -153,18 +153,18 @@ class Recording:
         return matches[0]
 
     def has(self, suffix: str, namespace: str | None = None) -> bool:
-        """Tell whether `find` would find at least one topic."""
+        """Return whether `find` would find at least one topic."""
         return bool(self._matches(suffix, namespace))
 
     def lacking(self, *suffixes: str, namespace: str | None = None) -> str:
-        """Say that topics, none of which `has` finds, are empty or not there, and which are."""
+        """Return a message that topics, none of which `has` finds, are empty or missing."""
         empty = [name for suffix in suffixes for name in self._called(suffix, namespace)]
         absent = [suffix for suffix in suffixes if not self._called(suffix, namespace)]
-        said = [f'no message was recorded on {", ".join(empty)}'] if empty else []
+        parts = [f'no message was recorded on {", ".join(empty)}'] if empty else []
         if absent:
             found = ', '.join(n for n in sorted(self.topics) if self.topics[n].message_count)
-            said.append(f'lacks topic {" and ".join(absent)}; it has {found or "none"}')
-        return f'{self.path}: {"; ".join(said)}'
+            parts.append(f'lacks topic {" and ".join(absent)}; it has {found or "none"}')
+        return f'{self.path}: {"; ".join(parts)}'
 
     def _matches(self, suffix: str, namespace: str | None) -> list[str]:
         names = self._called(suffix, namespace)

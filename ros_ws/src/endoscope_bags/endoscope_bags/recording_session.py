@@ -1,4 +1,4 @@
-"""The recorder without ROS: counts, losses, a full disk, and what is told at the end."""
+"""The recorder without ROS: counts, losses, a full disk, and the report at the end."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Arrival(NamedTuple):
 
 @dataclass(frozen=True)
 class SessionReport:
-    """How a recording went."""
+    """Report on a recording."""
 
     path: Path
     counts: dict[str, int]  # messages recorded, by topic
@@ -144,7 +144,7 @@ class RecordingSession:
         self._finish()
 
     def _finish(self) -> None:
-        # A writing thread may only now find that the last chunks have no room; the notes say so.
+        # A writing thread may only now find that the last chunks do not fit; the notes record it.
         try:
             self._writer.settle()
         except BagWriteError as error:
@@ -161,7 +161,7 @@ class RecordingSession:
         }
 
     def report(self) -> SessionReport:
-        """Say how it goes, or went."""
+        """Return the report so far, or the final one."""
         written = self._writer.counts
         counts = {s.topic: written.get(s.topic, 0) for s in self._sources}
         lost = {s.topic: s.gaps.lost + s.gaps.received - counts[s.topic] for s in self._sources}
@@ -172,7 +172,7 @@ class RecordingSession:
     def close(
         self, ended: str = 'on request', notes: Mapping[str, str] | None = None
     ) -> SessionReport:
-        """Finish the recording, noting in it why, and say how it went; again is harmless."""
+        """Finish the recording, with the reason in its notes; repeated calls are harmless."""
         if not self._writer.closed:
             self._ended = ended
             self._more_notes = dict(notes or {})
@@ -188,6 +188,6 @@ def simulated_receipt_ns(stamp_ns: int | None, last_tick_ns: int, now_ns: int) -
     if not last_tick_ns:
         return now_ns
     # What is found at a tick came during the tick before, or was sent already in this one by a node
-    # that heard the clock earlier. The stamp (None for types without one) tells which, so that the
+    # that received the clock earlier. The stamp (None for types without one) decides, so that the
     # same simulation is recorded the same whoever was faster.
     return min(now_ns, max(last_tick_ns, stamp_ns or 0))

@@ -1,4 +1,4 @@
-"""What kind of rig a recording is of, by the latched topic that says it."""
+"""Kind of the rig of a recording, from its latched topic."""
 
 from endoscope_bags.errors import MalformedMessageError
 from endoscope_bags.message_types import STRING
@@ -10,16 +10,16 @@ RIG_KIND = 'rig/kind'
 
 
 def kind_of_bag(recording: Recording) -> RigKind:
-    """Return what a recording says of its rig: unknown where it says nothing, or nothing readable.
+    """Return the kind of a recording's rig: unknown where it has none that is readable.
 
-    Where it says several things, as after a change of servos, it is real only if all of them are.
+    With several, as after a change of servos, it is real only if all of them are.
     """
-    said = []
+    kinds = []
     for name, topic in recording.topics.items():
         if not f'/{name}'.endswith(f'/{RIG_KIND}') or topic.type != STRING:
             continue
         try:
-            said += [kind_from_text(message.data) for _, message in recording.decoded(name)]
+            kinds += [kind_from_text(message.data) for _, message in recording.decoded(name)]
         except MalformedMessageError:
-            said.append(RigKind())
-    return kind_of_several(said)
+            kinds.append(RigKind())
+    return kind_of_several(kinds)

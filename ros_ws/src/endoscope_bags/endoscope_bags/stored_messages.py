@@ -26,7 +26,7 @@ class Block(NamedTuple):
 
 
 class StoredMessages:
-    """Messages of all files, each of which is read only where it is asked for."""
+    """Messages of all files, read on demand."""
 
     def __init__(self, scans: Sequence[McapScan]) -> None:
         self._scans = tuple(scans)

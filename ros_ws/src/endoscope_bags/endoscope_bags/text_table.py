@@ -28,7 +28,7 @@ _ROWS_AT_ONCE = 20_000
 
 @dataclass(frozen=True)
 class Converted:
-    """What was converted."""
+    """Result of a conversion."""
 
     rows: int
     messages: int

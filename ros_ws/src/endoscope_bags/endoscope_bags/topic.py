@@ -1,4 +1,4 @@
-"""What a recording says of its topics, their quality of service and their messages."""
+"""Topics of a recording, their quality of service and their messages."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

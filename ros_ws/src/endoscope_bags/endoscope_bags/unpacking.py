@@ -1,4 +1,4 @@
-"""What MCAP chunks hold, decompressed as far as any honest recording goes and no further."""
+"""Decompression of MCAP chunks, within limits that any genuine recording keeps."""
 
 import struct
 import zlib
@@ -25,7 +25,7 @@ _SIZE = struct.Struct('<Q')
 
 
 class ChunkError(ValueError):
-    """A chunk that does not hold what it says."""
+    """A chunk whose content does not match its head."""
 
 
 class ChunkHead(NamedTuple):

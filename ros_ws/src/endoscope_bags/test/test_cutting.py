@@ -47,7 +47,7 @@ def test_the_stretch_and_what_was_in_force_are_kept(bag, tmp_path):
 
 
 @pytest.mark.parametrize(('begin', 'end', 'lost'), [(0.0, 1.2, 0), (1.2, None, 1)])
-def test_what_was_lost_in_the_stretch_is_told(bag, tmp_path, begin, end, lost):
+def test_losses_in_the_cut_are_reported(bag, tmp_path, begin, end, lost):
     cut(bag, tmp_path / 'out', begin, end)
     topics = {t.name: t for t in bag_information(open_bag(tmp_path / 'out')).topics}
     assert topics['/stream'].lost == lost

@@ -33,7 +33,7 @@ def message(k, topic=STREAM, sequence=None):
 
 
 def filled(seconds=1.0, count=5000):
-    """A ring of the last second of five, with a state that was said once at the beginning."""
+    """A ring of the last second of five, with a state that was published once at the beginning."""
     recent = RecentMessages(seconds, 10**8)
     recent.add([message(0, STATE, 1)], {STATE}, START)
     for k in range(count):
@@ -52,7 +52,7 @@ def session_in(folder, kind=FAULT):
 
 
 def written(folder):
-    """A bag of a fault whose reason was told late, with a mark while it was written."""
+    """A bag of a fault whose reason came late, with a mark while it was written."""
     event = EventBag(filled(), FAULT, START + 4999 * MS)
     event.arrive(packed([message(5000)]), 1)
     assert event.lacks_reason

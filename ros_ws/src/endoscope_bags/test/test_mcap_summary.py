@@ -59,25 +59,25 @@ def test_metadata_that_are_not_where_it_says_are_not_believed(file):
 
 
 @pytest.mark.parametrize(
-    ('options', 'is_told'),
+    ('options', 'is_read'),
     [({}, True), ({'use_statistics': False}, False), ({'use_summary_offsets': False}, True)],
 )
-def test_files_of_the_library_are_read_as_far_as_they_tell(tmp_path, options, is_told):
+def test_files_of_the_library_are_read_as_far_as_they_have_a_summary(tmp_path, options, is_read):
     path = tmp_path / 'other.mcap'
     with path.open('wb') as stream:
         writer = Writer(stream, **options)
         writer.start('ros2', 'another')
         schema = writer.register_schema(STRING, 'ros2msg', b'string data')
         channel = writer.register_channel('/stream', 'cdr', schema)
-        writer.add_metadata('note', {'said': 'so'})
+        writer.add_metadata('note', {'text': 'so'})
         for k in range(3):
             writer.add_message(channel, START + k, encode_string('x'), START + k)
         writer.finish()
     summary = read_summary(path)
-    assert (summary is not None) == is_told
+    assert (summary is not None) == is_read
     if summary is not None:
         assert (summary.start_ns, summary.end_ns) == (START, START + 2)
-        assert summary.metadata == {'note': {'said': 'so'}}
+        assert summary.metadata == {'note': {'text': 'so'}}
 
 
 def test_a_listing_reads_no_messages_of_what_is_whole(file):

@@ -49,7 +49,7 @@ def test_installed_types_beyond_the_common_ones_are_found():
 @pytest.mark.parametrize(
     ('name', 'expected'), [(JOINT_STATE, True), (JOY, True), (STRING, False), (CLOCK, False)]
 )
-def test_types_with_a_header_are_told_apart(name, expected):
+def test_types_with_a_header_are_recognised(name, expected):
     assert begins_with_header(message_type(name).definition) is expected
 
 

@@ -45,23 +45,23 @@ def test_what_is_too_old_is_forgotten():
     assert recent.size == 0
 
 
-def test_a_flood_does_not_grow_beyond_the_room():
-    room = 40_000_000
-    recent = RecentMessages(20.0, room)
+def test_a_flood_does_not_grow_beyond_the_capacity():
+    capacity = 40_000_000
+    recent = RecentMessages(20.0, capacity)
     largest, sizes = 0, np.random.default_rng(1).integers(1, 400_000, size=2000).tolist()
     for ms, size in enumerate(sizes):
         recent.add([arrival(ms, size=size), arrival(ms, STATE, size // 2)], {STATE}, ms * MS)
-        assert bytes_held(recent) <= recent.size <= room
+        assert bytes_held(recent) <= recent.size <= capacity
         largest = max(largest, recent.size)
-    assert largest > 0.9 * room
+    assert largest > 0.9 * capacity
     # What is left is the newest.
     assert all_of(recent)[-1].received_ns == (len(sizes) - 1) * MS
     assert recent.left_out == 0
 
 
 def test_small_messages_take_little_more_than_their_bytes():
-    room = 2_000_000
-    recent = RecentMessages(20.0, room)
+    capacity = 2_000_000
+    recent = RecentMessages(20.0, capacity)
     tracemalloc.start()
     try:
         for ms in range(0, 20_000, 2):
@@ -69,11 +69,11 @@ def test_small_messages_take_little_more_than_their_bytes():
         taken, _ = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
-    assert 0.9 * room < recent.size <= room
-    assert taken < 1.25 * room
+    assert 0.9 * capacity < recent.size <= capacity
+    assert taken < 1.25 * capacity
 
 
-def test_a_message_larger_than_the_room_is_left_out_alone():
+def test_a_message_larger_than_the_capacity_is_left_out_alone():
     recent = RecentMessages(20.0, 1000)
     recent.add([arrival(1), arrival(2, size=5000), arrival(3)], (), 3 * MS)
     assert [message.received_ns // MS for message in all_of(recent)] == [1, 3]
@@ -81,7 +81,7 @@ def test_a_message_larger_than_the_room_is_left_out_alone():
     assert recent.size <= 1000
 
 
-def test_states_larger_than_the_room_do_not_stay_for_ever():
+def test_states_larger_than_the_capacity_do_not_stay_for_ever():
     recent = RecentMessages(0.001, 1000)
     for topic in range(100):
         recent.add([arrival(topic * 10, topic, 90)], set(range(100)), topic * 10 * MS)

@@ -59,7 +59,7 @@ def test_a_suffix_matches_whole_names_only(tmp_path):
         bag.joint_state('motor/measured_js')
 
 
-def test_two_namespaces_have_to_be_told_apart(tmp_path):
+def test_two_namespaces_have_to_be_distinguished(tmp_path):
     with BagWriter(tmp_path / 'bag') as writer:
         for k, topic in enumerate(('/a/wires/measured_js', '/b/wires/measured_js')):
             writer.write_raw(topic, JOINT_STATE, encode_joint_state(['w'], k, effort=[k]), k)
@@ -171,7 +171,7 @@ def test_what_is_no_bag_is_named(tmp_path):
         assert '\n' not in str(raised.value)
 
 
-def test_a_recording_without_messages_is_said(tmp_path):
+def test_a_recording_without_messages_is_reported(tmp_path):
     with BagWriter(tmp_path / 'bag') as writer:
         writer.add_topic('/a', STRING)
     with pytest.raises(BagError, match='bag: holds no message'):
@@ -196,7 +196,7 @@ def test_metadata_that_do_not_lead_to_messages_are_named(tmp_path, changed, what
         open_bag(tmp_path / 'bag')
 
 
-def test_a_recording_in_sqlite3_storage_is_told_how_to_become_an_mcap(tmp_path):
+def test_the_error_for_sqlite3_storage_names_the_conversion(tmp_path):
     old = tmp_path / 'my old'
     with Sqlite3Writer(old, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
         topic = writer.add_connection('/rig/a', JOINT_STATE, typestore=typestore())
@@ -236,7 +236,7 @@ def test_a_flipped_bit_is_noticed(tmp_path):
         open_bag(path)
 
 
-def test_a_topic_without_a_message_is_said_to_be_empty(tmp_path):
+def test_a_topic_without_a_message_is_reported_as_empty(tmp_path):
     with BagWriter(tmp_path / 'bag') as writer:
         for topic in ('/a/motor/servo_jp', '/a/wires/measured_js'):
             writer.add_topic(topic, JOINT_STATE, [SENSOR_QOS])

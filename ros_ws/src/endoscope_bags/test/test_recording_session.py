@@ -111,7 +111,7 @@ def fill(path, limit, threaded, count):
 # closing in the short recording, and while it is made in the long one.
 @pytest.mark.parametrize('count', [4000, 8000])
 @pytest.mark.parametrize('threaded', ['threaded', 'inline'])
-def test_a_full_disk_keeps_what_is_there_and_is_said(tmp_path, threaded, count):
+def test_a_full_disk_keeps_what_is_there_and_is_reported(tmp_path, threaded, count):
     recorded, lost, complete, finished, text = fill(tmp_path / 'bag', 700_000, threaded, count)
     assert recorded + lost == count
     assert 500 < recorded < 2000

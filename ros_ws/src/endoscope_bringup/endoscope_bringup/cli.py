@@ -38,7 +38,7 @@ class _Version(argparse.Action):
 
 
 class _Program(OneLineParser):
-    """Says of a command whose package is not installed which package that is."""
+    """Names the missing package of a command that is not installed."""
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         missing = action.dest == 'command' and value not in (action.choices or ())
@@ -61,7 +61,7 @@ def build_parser() -> OneLineParser:
     parser.add_argument(
         '--log-level',
         choices=LOG_LEVELS,
-        help='the least that the nodes and libraries of this command say to the log (info)',
+        help='lowest level that nodes and libraries of this command log (info)',
     )
     own = [f'endoscope_bringup.commands.{name}' for name in COMMANDS]
     add_subcommands(parser, [*own, *commands_of_other_packages().values()], dest='command')

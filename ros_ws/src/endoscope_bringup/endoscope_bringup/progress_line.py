@@ -1,4 +1,4 @@
-"""What a long command is doing: a bar in a terminal, else a line for each step."""
+"""Progress of a long command: a bar in a terminal, else a line for each step."""
 
 import shutil
 import sys
@@ -11,10 +11,10 @@ REDRAWN_S = 1.0
 
 
 class ProgressLine:
-    """A bar of one line that says which step is under way, and for how long already.
+    """A bar of one line with the current step and the elapsed time.
 
-    `steps` is about how many there are, where :meth:`show` does not say the share: a bar is full
-    only when all is done. Where `stream` (default: stderr) is no terminal, each step is a line, but
+    `steps` is their approximate number, if :meth:`show` does not give the share: a bar is full only
+    when all is done. Where `stream` (default: stderr) is no terminal, each step is a line, but
     not the `first`, which begins at once: bad input is refused in it, with one line alone.
     """
 
@@ -44,7 +44,7 @@ class ProgressLine:
             self._write('\r\x1b[K')
 
     def step(self, text: str) -> None:
-        """Say which step begins; what the audit finds is a line of its own."""
+        """Show the step that begins; findings of the audit are separate lines."""
         with self._lock:
             remark = text.startswith(('note:', 'audit:'))
             if not remark:
@@ -56,7 +56,7 @@ class ProgressLine:
                 self._draw()
 
     def show(self, step: str, share: float) -> None:
-        """Say which step it is at, and the share of all that is done."""
+        """Show the current step, and the share of the work that is done."""
         with self._lock:
             self._done = share * self._steps
             if self._shows:

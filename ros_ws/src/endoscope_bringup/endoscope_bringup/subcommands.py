@@ -29,14 +29,14 @@ _ENTRY = re.compile(r'^(\S+) *= *([\w.]+) *$', re.MULTILINE)
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """An `ArgumentParser` whose errors are one line, with the nearest of what there is."""
+    """An `ArgumentParser` whose errors are one line, with the nearest known word."""
 
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
         """Parse, and refuse what is unknown where it is known what else there is."""
         words = sys.argv[1:] if args is None else list(args)
-        # Before a missing argument is said to be missing, which is often the misspelt one.
+        # Before a missing argument is reported, which is often the misspelt one.
         for word in itertools.takewhile(lambda word: word != '--', words):
             if not word.startswith('-') and self._subparsers is not None:
                 break  # a subcommand: the rest is for its parser
@@ -127,7 +127,7 @@ def print_json(content: object) -> None:
 
 
 def print_json_line(content: object) -> None:
-    """Print the same in one line, of plain ASCII: whatever a stranger wrote steers no terminal."""
+    """Print the same in one line of ASCII, so that no foreign text controls the terminal."""
     print(json.dumps(_plain(content), allow_nan=False), flush=True)
 
 

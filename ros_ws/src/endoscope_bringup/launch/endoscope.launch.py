@@ -91,7 +91,7 @@ def generate_launch_description() -> LaunchDescription:
                 choices=['true', 'false'],
                 description='whether the rig is compared with its plant while it moves',
             ),
-            # In one process the graph decides for itself unless it is told.
+            # In one process the graph decides for itself unless this is given.
             SetParameter('use_sim_time', False, condition=IfCondition(real_time)),
             SetParameter('use_sim_time', True, condition=in_lock_step),
             GroupAction([node('graph')], condition=IfCondition(NotSubstitution(many))),

@@ -96,7 +96,7 @@ def test_a_defect_is_one_line_that_says_where_and_keeps_its_traceback_for_debug(
         ('demo -q', 'unknown option -q: valid are --help, --out'),
     ],
 )
-def test_a_misspelt_command_or_option_is_told_the_nearest(argv, words, capsys):
+def test_the_error_for_a_misspelt_command_or_option_names_the_nearest(argv, words, capsys):
     with pytest.raises(SystemExit) as stop:
         cli.main(argv.split())
     assert stop.value.code == 2
@@ -137,7 +137,7 @@ def test_signal_gives_its_status_and_leaves_no_output(signum, status, monkeypatc
 def test_a_reader_that_goes_away_or_has_no_room_gets_no_traceback(program, tmp_path):
     write_text(tmp_path / 'program.py', f'import sys\ntry:\n    {program}\nfinally:\n    pass\n')
     run = f'{sys.executable} {tmp_path / "program.py"}'
-    for line, said in (
+    for line, message in (
         # True ends at once, so that the pipe is closed when something is written.
         (f'{{ sleep 0.1; {run}; }} | true', ''),
         (f'{run} >&-', ''),
@@ -146,5 +146,5 @@ def test_a_reader_that_goes_away_or_has_no_room_gets_no_traceback(program, tmp_p
         *([(f'{run} >/dev/full', 'No space left on device')] if 'effects' in program else []),
     ):
         done = subprocess.run(['bash', '-c', line], capture_output=True, text=True, check=False)
-        assert said in done.stderr
-        assert len(done.stderr.splitlines()) == bool(said), done.stderr
+        assert message in done.stderr
+        assert len(done.stderr.splitlines()) == bool(message), done.stderr

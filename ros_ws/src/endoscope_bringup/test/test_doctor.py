@@ -18,22 +18,22 @@ def emulator():
 
 def test_healthy_servos_need_no_change(emulator, capsys):
     assert main(['doctor', '--port', emulator.port, *SPEEDS]) == 0
-    said = capsys.readouterr().out
-    assert '2 servos' in said
-    assert 'servo 1: XM430-W350, firmware 45, 1000000 baud, 12.0 V, 30 °C' in said
-    assert 'latency timer none' in said
-    assert 'change:' not in said
+    output = capsys.readouterr().out
+    assert '2 servos' in output
+    assert 'servo 1: XM430-W350, firmware 45, 1000000 baud, 12.0 V, 30 °C' in output
+    assert 'latency timer none' in output
+    assert 'change:' not in output
 
 
-def test_what_is_wrong_is_told_with_what_to_do(capsys):
+def test_errors_are_reported_with_advice(capsys):
     with EmulatorProcess(baud=57_600) as emulator:
         emulator.do('overload', 2)
         emulator.do('supply', 1, 9.0)
         assert main(['doctor', '--port', emulator.port, *SPEEDS]) == 1
-        said = capsys.readouterr().out
-        assert 'servo 1: supply of 9.0 V: give 10 to 14.8 V' in said
-        assert 'servo 2: overload: remove the cause' in said
-        assert 'set Baud Rate(8) to 3 (1 Mbaud)' in said
+        output = capsys.readouterr().out
+        assert 'servo 1: supply of 9.0 V: give 10 to 14.8 V' in output
+        assert 'servo 2: overload: remove the cause' in output
+        assert 'set Baud Rate(8) to 3 (1 Mbaud)' in output
         arguments = ['--port', emulator.port, '--baud', '57600']
         assert main(['doctor', *arguments, '--reboot', '2']) == 0
         while emulator.state(2)['hardware']:

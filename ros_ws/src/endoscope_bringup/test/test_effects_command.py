@@ -20,15 +20,15 @@ def test_lists_every_effect(capsys):
     assert [line.split()[0] for line in places.splitlines()[1:]] == list(FUNCTIONS)
 
 
-def test_tells_equation_source_and_parameters(capsys):
+def test_shows_equation_source_and_parameters(capsys):
     assert main(['effects', 'joint_stop', 'load_cell_gain']) == 0
-    told = ' '.join(capsys.readouterr().out.split())
+    output = ' '.join(capsys.readouterr().out.split())
     definition = CATALOGUE['joint_stop']
-    assert definition.equation in told
-    assert definition.source in told
-    assert '0.05 to 2.5 rad, typical 0.25, off at 2.5' in told
+    assert definition.equation in output
+    assert definition.source in output
+    assert '0.05 to 2.5 rad, typical 0.25, off at 2.5' in output
     assert (
-        'wire 0: the cell of the positive wire, 1: the cell of the negative wire, typical' in told
+        'wire 0: the cell of the positive wire, 1: the cell of the negative wire, typical' in output
     )
 
 
@@ -60,8 +60,8 @@ def test_the_catalogue_as_json(capsys):
     assert plant_from_mapping(json.loads(capsys.readouterr().out)) == PlantDescription()
 
 
-def test_tells_of_a_place(capsys):
+def test_shows_a_place(capsys):
     assert main(['effects', 'load_of_speed']) == 0
-    told = ' '.join(capsys.readouterr().out.split())
-    assert "f(w), odd, w = the joint's angular speed" in told
-    assert 'w -10 to 10 rad/s where no range is given' in told
+    output = ' '.join(capsys.readouterr().out.split())
+    assert "f(w), odd, w = the joint's angular speed" in output
+    assert 'w -10 to 10 rad/s where no range is given' in output

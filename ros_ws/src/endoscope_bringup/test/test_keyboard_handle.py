@@ -37,7 +37,7 @@ class Hand:
         return [self.turn() for _ in range(ms // TURN)]
 
     def hold(self, key, ms, delay=400, period=30):
-        """A key held for some time as a terminal tells it: when the clutch was first held."""
+        """A key held for some time as a terminal sends it: when the clutch was first held."""
         began = self.ms
         self.turn(key)
         engaged, due = None, began + TURN + delay
@@ -190,7 +190,7 @@ TURNS = st.lists(
 
 
 @given(TURNS)
-def test_no_motion_without_a_fresh_sign_of_a_held_key_and_none_faster_than_said(turns):
+def test_no_motion_without_a_fresh_sign_of_a_held_key_and_none_faster_than_set(turns):
     handle = KeyboardHandle(2, SPEED)
     now, heard, before = 0, None, (0.0, 0.0)
     handle.turn(0)

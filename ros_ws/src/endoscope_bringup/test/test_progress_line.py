@@ -23,14 +23,14 @@ def steps(stream):
 
 
 def test_without_a_terminal_each_step_is_a_line():
-    said, found = steps(io.StringIO())
-    assert said == 'refitting\naudit: a remark\nsearching\n'
+    output, found = steps(io.StringIO())
+    assert output == 'refitting\naudit: a remark\nsearching\n'
     assert found == 'found\n'
 
 
 def test_in_a_terminal_a_bar_says_what_is_done_and_goes():
-    said, found = steps(Terminal())
-    drawn = said.split('\r\x1b[K')
+    output, found = steps(Terminal())
+    drawn = output.split('\r\x1b[K')
     assert '[....................] 0 s  reading' in drawn
     assert '[#####...............] 0 s  refitting' in drawn
     assert 'audit: a remark\n' in drawn
@@ -39,14 +39,14 @@ def test_in_a_terminal_a_bar_says_what_is_done_and_goes():
     assert found == 'found\n'
 
 
-def test_where_shares_are_said_each_step_is_a_line_once():
+def test_with_shares_each_step_is_a_line_once():
     for stream in (io.StringIO(), Terminal()):
         with ProgressLine(stream=stream) as progress:
             for share in (0.2, 0.3, 0.5):
                 progress.show('moving' if share < 0.5 else 'judging', share)
-        said = stream.getvalue()
+        output = stream.getvalue()
         if stream.isatty():
-            assert '[######..............] 0 s  moving' in said
-            assert '[##########..........] 0 s  judging' in said
+            assert '[######..............] 0 s  moving' in output
+            assert '[##########..........] 0 s  judging' in output
         else:
-            assert said == 'moving\njudging\n'
+            assert output == 'moving\njudging\n'

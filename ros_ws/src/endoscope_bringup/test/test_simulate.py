@@ -110,15 +110,15 @@ def test_recorded_poses_are_answered_by_those_of_the_answered_angles(plant_file,
     )
     assert run(plant_file, tmp_path / 'poses', tmp_path / 'answer', '--noise', '1') == 0
     answer = open_bag(tmp_path / 'answer')
-    told, bending = answer.poses('tracker/measured_cp'), answer.joint_state('slave/measured_js')
-    assert told.topic == '/a/tracker/measured_cp'
-    assert told.frame_id == 'base'
-    np.testing.assert_array_equal(told.stamp_ns, tracked)
-    np.testing.assert_array_equal(told.log_ns, tracked + 9)
-    angles = np.array([bending_from_orientation(q) for q in told.orientation])
+    pose, bending = answer.poses('tracker/measured_cp'), answer.joint_state('slave/measured_js')
+    assert pose.topic == '/a/tracker/measured_cp'
+    assert pose.frame_id == 'base'
+    np.testing.assert_array_equal(pose.stamp_ns, tracked)
+    np.testing.assert_array_equal(pose.log_ns, tracked + 9)
+    angles = np.array([bending_from_orientation(q) for q in pose.orientation])
     np.testing.assert_allclose(angles[:, columns], bending.position, atol=1e-9)
     length_of_arc = [tip_pose(angle, 0.03)[0] for angle in angles]
-    np.testing.assert_allclose(told.position, length_of_arc, atol=1e-9)
+    np.testing.assert_allclose(pose.position, length_of_arc, atol=1e-9)
 
 
 def test_desired_angles_times_the_gear_stand_in_for_shaft_commands(plant_file, tmp_path):
@@ -171,7 +171,7 @@ UNSET = encode_joint_states(BOTH, np.zeros(TICKS, dtype=np.int64), position=SHAF
 
 
 @pytest.mark.parametrize(
-    ('commands', 'said'),
+    ('commands', 'message'),
     [
         (stream('/x/wires/measured_js', ['w'], STAMPS, effort=SHAFT[:, :1]), 'motor/servo_jp'),
         (
@@ -187,9 +187,9 @@ UNSET = encode_joint_states(BOTH, np.zeros(TICKS, dtype=np.int64), position=SHAF
     ids=['none', 'in degrees', 'not finite', 'without stamps'],
 )
 def test_commands_that_cannot_be_used_are_one_line_and_leave_nothing(
-    plant_file, tmp_path, capsys, commands, said
+    plant_file, tmp_path, capsys, commands, message
 ):
     assert run(plant_file, written(tmp_path / 'commands', commands), tmp_path / 'answer') == 2
     [line] = capsys.readouterr().err.splitlines()
-    assert re.search(said, line)
+    assert re.search(message, line)
     assert sorted(p.name for p in tmp_path.iterdir()) == ['commands', 'plant.yaml']

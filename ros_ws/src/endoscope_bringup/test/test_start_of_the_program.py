@@ -22,7 +22,7 @@ finally:
 """
 
 
-# A module of a command, and what tells Python of it.
+# A module of a command, and the metadata by which Python finds it.
 BREW = """
 def add_parser(subparsers):
     subparsers.add_parser('brew', help='make tea').add_argument('sort')
@@ -125,9 +125,9 @@ def test_without_the_lab_there_is_no_bench_and_one_line_says_so(monkeypatch, cap
     with pytest.raises(SystemExit) as stop:
         cli.main(['bench', 'graph', '--seconds', '3'])
     assert stop.value.code == 2
-    said = capsys.readouterr().err
-    assert 'endoscope_lab' in said
-    assert said.count('\n') == 1
+    output = capsys.readouterr().err
+    assert 'endoscope_lab' in output
+    assert output.count('\n') == 1
     assert 'bench' not in cli.build_parser().format_help()
 
 
@@ -146,8 +146,8 @@ def test_bash_completes_a_command():
     assert shown.stdout.split() == ['teleop'], shown.stderr
 
 
-@pytest.mark.parametrize(('level', 'said'), [('info', True), ('error', False)])
-def test_the_level_of_the_log_holds_for_the_nodes_of_a_command(tmp_path, level, said):
+@pytest.mark.parametrize(('level', 'shows_it'), [('info', True), ('error', False)])
+def test_the_level_of_the_log_holds_for_the_nodes_of_a_command(tmp_path, level, shows_it):
     begun = (
         'import sys; from endoscope_nodes.runtime.runtime import Runtime; '
         'Runtime.spin = lambda runtime: None; '
@@ -159,4 +159,4 @@ def test_the_level_of_the_log_holds_for_the_nodes_of_a_command(tmp_path, level, 
         text=True,
         check=False,
     )
-    assert ('recording to' in shown.stderr) is said, shown.stderr
+    assert ('recording to' in shown.stderr) is shows_it, shown.stderr

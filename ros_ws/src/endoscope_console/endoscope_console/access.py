@@ -1,8 +1,8 @@
-"""Who gets in: one layer that every request and every socket passes, and the tokens of a hello.
+"""Access control: one layer that every request and every socket passes, and the tokens of a hello.
 
-Each of the three checks is for another attacker: the token for other users of this machine, the
-``Host`` for pages whose name was pointed at this machine (DNS rebinding), the ``Origin`` for other
-pages in the operator's own browser.
+Each of the three checks is against another attacker: the token against other users of this machine,
+the ``Host`` against pages whose name was pointed at this machine (DNS rebinding), the ``Origin``
+against other pages in the operator's own browser.
 """
 
 import hmac
@@ -52,7 +52,7 @@ _HEADERS = (
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why somebody does not get in."""
+    """Why access is refused."""
 
     status: int  # of the answer to a request
     check: str  # name of the check, by which it is counted
@@ -147,7 +147,7 @@ async def _answer(refusal: Refusal, send: Send) -> None:
 
 @dataclass(frozen=True)
 class Tokens:
-    """Two secrets: who knows the one may operate, who knows the other may look on."""
+    """Two secrets: one grants operating, the other viewing."""
 
     operator: str  # at least 32 random bytes, as text that fits into an address
     viewer: str
@@ -181,9 +181,9 @@ class Tokens:
         return tokens
 
     def role(self, token: str) -> str:
-        """Return what the bearer of a token may be: operator, viewer, or empty for nothing."""
+        """Return the role that a token grants: operator, viewer, or empty for none."""
         given = token[:_LONGEST_TOKEN].encode()
-        # Both are compared whatever the first says, so that the time tells nothing.
+        # Both are always compared, so that the duration reveals nothing.
         operates = hmac.compare_digest(given, self.operator.encode())
         looks_on = hmac.compare_digest(given, self.viewer.encode())
         return OPERATOR if operates else VIEWER if looks_on else ''

@@ -1,4 +1,4 @@
-"""Alarms: what asks for attention, how urgently, and what stays until somebody has seen it."""
+"""Alarms: conditions that need attention, their priority, and latching until acknowledged."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ class Level(StrEnum):
 
 @dataclass(frozen=True)
 class Alarm:
-    """What asks for attention."""
+    """A condition that needs attention."""
 
     id: str  # by which it is acknowledged
     level: Level
@@ -26,9 +26,9 @@ class Alarm:
 
 
 class Alarms:
-    """Those that are shown: what is present, and what latches and was not acknowledged.
+    """Alarms that are shown: those present, and latched ones that were not acknowledged.
 
-    Acknowledging says that somebody has seen it; it mends and enables nothing.
+    Acknowledging records that an alarm was seen; it neither resolves nor enables anything.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""A command of this program beside the graph: one at a time, with less of the machine than it."""
+"""A command of this program beside the graph: one at a time, at a lower priority."""
 
 import asyncio
 import os
@@ -35,15 +35,15 @@ class Background:
     async def run(
         self,
         words: Sequence[str],
-        said: Callable[[str], None],
+        line: Callable[[str], None],
         step: Callable[[str], None],
         *,
         answers: bool = False,
     ) -> int:
         """Run `endoscope` with these words; its status.
 
-        `said` takes each line of its output and `step` of its errors. With `answers`, `tell` writes
-        to its input. What cannot be followed is ended at once.
+        `line` takes each line of its output and `step` of its errors. With `answers`, `answer`
+        writes to its input. On an exception in either the command is killed.
         """
         pipe, nothing = asyncio.subprocess.PIPE, asyncio.subprocess.DEVNULL
         process = self._process = await asyncio.create_subprocess_exec(
@@ -56,14 +56,14 @@ class Background:
         with suppress(ProcessLookupError):
             os.setpriority(os.PRIO_PROCESS, process.pid, _NICE)
         try:
-            await asyncio.gather(_each(process.stdout, said), _each(process.stderr, step))
+            await asyncio.gather(_each(process.stdout, line), _each(process.stderr, step))
         except BaseException:
             with suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
             raise
         return await process.wait()
 
-    def tell(self, line: str) -> None:
+    def answer(self, line: str) -> None:
         """Write a line to the input of the command, unless it has ended."""
         if self._process is not None and self._process.stdin is not None:
             self._process.stdin.write(f'{line}\n'.encode())

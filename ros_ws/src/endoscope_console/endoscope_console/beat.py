@@ -1,7 +1,7 @@
-"""The beat of the handle: a thread that judges the dead-man and speaks for the handle, at 250 Hz.
+"""The handle's thread: evaluates the dead-man and publishes the handle topics, at 250 Hz.
 
-The deadline is judged here and not where the sockets are read: whatever holds those up releases the
-clutch instead of holding it.
+The deadline is checked here and not where the sockets are read: if those are held up, the clutch is
+released instead of held.
 """
 
 import threading
@@ -25,31 +25,31 @@ _UNTIL_STOPPED_S = 2.0
 
 @dataclass(frozen=True)
 class Situation(Conditions):
-    """What the graph and the lease are like, as the other threads last said."""
+    """State of the graph and the lease, as last set by the other threads."""
 
-    speaks: bool = False  # the handle's place is free and its own: only then it is a sender
+    publishes: bool = False  # whether this server is the publisher of the handle topics
     wanted: tuple[float, ...] | None = None  # (J,), asked of the slave by the master, in rad
     wanted_ns: int = 0  # when they were heard
     scale: float = 1.0  # slave motion for one radian of the handle
 
 
 @dataclass(frozen=True)
-class Said:
-    """Where the dead-man is, as of a beat; see :class:`OperatorDeadMan`."""
+class BeatReport:
+    """State of the dead-man at a beat; see :class:`OperatorDeadMan`."""
 
     state: DeadManState = DeadManState.OPEN
     reason: Reason | None = None
     missing: Reason | None = Reason.LOST
     counts: dict[str, int] = field(default_factory=dict)  # how often each reason has ended a grip
-    speaks: bool = False  # whether the handle is spoken for
+    publishes: bool = False  # whether the handle topics are published
 
 
 class Beat:
     """The thread; it shares one-slot mailboxes and a queue of arrivals with the others."""
 
     def __init__(self, node: Node, handle: PadHandle) -> None:
-        self.situation = Situation()  # to be replaced by whoever knows a newer one
-        self.said = Said()  # by the dead-man in the last beat in which it changed
+        self.situation = Situation()  # replaced as a whole by other threads
+        self.report = BeatReport()  # by the dead-man in the last beat in which it changed
         self._node = node
         self._handle = handle
         self._dead_man = OperatorDeadMan()
@@ -70,7 +70,7 @@ class Beat:
 
     @property
     def alive(self) -> bool:
-        """Whether the thread goes on; nothing moves where it does not."""
+        """Whether the thread runs; nothing moves otherwise."""
         return self._thread.is_alive()
 
     @property
@@ -83,7 +83,7 @@ class Beat:
         self._arrivals.append((client, frame, arrived_ns))
 
     def refuse(self, client: str, reason: Reason, now_ns: int) -> None:
-        """Take what is no frame, from a client at a steady time in ns; or that it is gone."""
+        """Take an invalid frame of a client, or its disconnection, at a steady time in ns."""
         self._arrivals.append((client, reason, now_ns))
 
     def _run(self) -> None:
@@ -108,17 +108,17 @@ class Beat:
                 dead_man.closed(client)
             else:
                 dead_man.refuse(what, client)
-        # Read only now: a frame may tell of a picture that was not there before it was heard.
+        # Read only now: a frame may name a picture that was made after the last reading.
         situation = self.situation
         dead_man.turn(now_ns, situation)
-        self._speak(now_ns, situation)
-        self._say()
+        self._publish(now_ns, situation)
+        self._report()
 
-    def _speak(self, now_ns: int, situation: Situation) -> None:
-        """Say where the handle is and whether its clutch is held, while that is this one's part."""
-        if self._sender is None and situation.speaks:
+    def _publish(self, now_ns: int, situation: Situation) -> None:
+        """Publish the handle's angles and clutch, while this server is the publisher."""
+        if self._sender is None and situation.publishes:
             self._sender = HandleSender(self._node)
-        elif self._sender is not None and not situation.speaks:
+        elif self._sender is not None and not situation.publishes:
             self._leave()
         engaged = self._dead_man.engaged
         if self._sender is None:
@@ -131,7 +131,7 @@ class Beat:
         fresh = situation.wanted_ns > max(self._engaged_ns, now_ns - _WANTED_NS)
         position = self._handle.follow(
             now_ns,
-            # What plays meanwhile is not moved by the hand that lets it play.
+            # The hand that lets a motion play does not move the handle.
             self._dead_man.frame if engaged and not situation.playing else None,
             situation.wanted if fresh else None,
             situation.scale,
@@ -149,12 +149,12 @@ class Beat:
             self._sender.close()
             self._sender = None
 
-    def _say(self) -> None:
-        dead_man, said = self._dead_man, self.said
+    def _report(self) -> None:
+        dead_man, last = self._dead_man, self.report
         now = (dead_man.state, dead_man.reason, dead_man.missing, self._sender is not None)
-        if now == (said.state, said.reason, said.missing, said.speaks):
+        if now == (last.state, last.reason, last.missing, last.publishes):
             return
-        self.said = Said(
+        self.report = BeatReport(
             dead_man.state,
             dead_man.reason,
             dead_man.missing,

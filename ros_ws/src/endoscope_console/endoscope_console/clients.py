@@ -1,4 +1,4 @@
-"""The pages that are connected: who may be, how much each may send, and what waits for each."""
+"""The connected pages: their number, their rate limits and their outboxes."""
 
 import asyncio
 from collections import Counter, deque
@@ -11,9 +11,9 @@ from endoscope_console.access import VIEWER
 Kind = Literal['telemetry', 'command']
 
 HELLO_S = 2.0
-"""Within so long a socket must have said hello."""
+"""Time limit for the hello of a socket."""
 UNANSWERED = 8
-"""Sockets that may be open without having said it."""
+"""Largest number of sockets without a hello."""
 OF_A_KIND = 16
 VIEWERS_OF_A_KIND = 4
 FRAMES_A_SECOND = 200
@@ -44,7 +44,7 @@ class FrameRate:
 
 
 class Outbox:
-    """What waits to be sent to a client: the newest pictures, and the newest state."""
+    """Queue to a client: the newest pictures, and the newest state."""
 
     def __init__(self) -> None:
         self.dropped = 0  # pictures that it never got, since newer ones came
@@ -53,7 +53,7 @@ class Outbox:
         self._filled = asyncio.Event()
 
     def put_picture(self, picture: bytes) -> None:
-        """Add a picture; the oldest gives way."""
+        """Add a picture; the oldest is dropped."""
         if len(self._pictures) == QUEUED:
             self._pictures.popleft()
             self.dropped += 1
@@ -79,7 +79,7 @@ class Outbox:
 
 @dataclass(eq=False)
 class Client:
-    """A socket that has said hello."""
+    """A socket after its hello."""
 
     id: str  # its name, ``c3``
     kind: Kind  # which socket
@@ -88,7 +88,7 @@ class Client:
     rate: FrameRate = field(default_factory=lambda: FrameRate(FRAMES_A_SECOND))
     outbox: Outbox = field(default_factory=Outbox)  # what waits for it, on the socket for telemetry
     # Sends it an object that it did not ask for, on the socket for commands.
-    tell: Callable[[dict[str, object]], None] = lambda message: None
+    notify: Callable[[dict[str, object]], None] = lambda message: None
     orders: int = 0  # not answered yet
 
     @property
@@ -107,7 +107,7 @@ class Clients:
         self._unanswered = 0
 
     def knock(self) -> bool:
-        """Note a socket that opens; false where too many have not said hello."""
+        """Note a socket that opens; false where too many are without a hello."""
         if self._unanswered >= UNANSWERED:
             self.counts['refused: too many sockets without hello'] += 1
             return False
@@ -115,11 +115,11 @@ class Clients:
         return True
 
     def answered(self) -> None:
-        """Note that a socket has said hello, or is gone before it did."""
+        """Note the hello of a socket, or its end before that."""
         self._unanswered -= 1
 
     def admit(self, kind: Kind, role: str, address: str) -> Client | str:
-        """Make a client of a socket that has said hello; or why not."""
+        """Make a client of a socket after its hello; or why not."""
         of_kind = [client for client in self._open.values() if client.kind == kind]
         if len(of_kind) >= OF_A_KIND:
             self.counts['refused: too many clients'] += 1

@@ -9,9 +9,9 @@ DEFAULT_VIEWERS_PORT = 8765
 """Where viewers look for a server first."""
 
 _EPILOG = """\
-The address that is printed carries a token: who has it may operate. It is for this machine alone;
-another one is let in by --host with an address of this machine, which needs a certificate. Ctrl-C
-ends the page and, where this command started it, the graph.
+The printed address contains a token, which grants control. The page is reachable from this machine
+only; --host with an address of this machine admits others and needs a certificate. Ctrl-C ends the
+page and, if this command started it, the graph.
 """
 
 
@@ -19,9 +19,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `console`."""
     parser = subparsers.add_parser(
         'console',
-        help='operate by a page in the browser, with a graph started unless one runs',
-        description='Serves the page by which a person operates the slave, watches it and has '
-        'recordings explained, and prints its address. Starts a graph unless one answers.',
+        help='operate in the browser; starts a graph unless one runs',
+        description='Serves the page on which a person operates and monitors the slave and '
+        'explains recordings, and prints its address. Starts a graph unless one answers.',
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -35,7 +35,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         '--port',
         type=_port,
         default=DEFAULT_PORT,
-        help='0 for any that is free (default: %(default)d)',
+        help='port; 0 for any that is free (default: %(default)d)',
     )
     parser.add_argument(
         '--certificate', type=Path, metavar='FILE', help='for https: certificate chain, PEM'
@@ -45,7 +45,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         '--token-file',
         type=Path,
         metavar='FILE',
-        help='keep the tokens there, so that the addresses stay; by default they are new each time',
+        help='store the tokens in FILE, so that the addresses stay; by default they are new each '
+        'time',
     )
     parser.add_argument(
         '--origin',
@@ -57,7 +58,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument(
         '--allow-no-origin',
         action='store_true',
-        help='let programs that are not browsers open the sockets; they need the token too',
+        help='allow programs that are not browsers to open the sockets; they need the token too',
     )
     parser.add_argument(
         '--no-graph', action='store_true', help='start no graph, wait for one to answer'
@@ -65,7 +66,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser.add_argument(
         '--real-time',
         action='store_true',
-        help='run that graph by the wall clock also where all devices are simulated',
+        help='run the started graph by the wall clock even if all devices are simulated',
     )
     parser.add_argument(
         '--graph',
@@ -81,7 +82,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         type=Path,
         default=Path('bags'),
         metavar='DIR',
-        help='recordings that can be explained, and where that goes (default: %(default)s)',
+        help='folder of recordings to explain, and of their explanations (default: %(default)s)',
     )
     parser.add_argument(
         '--rate',
@@ -89,22 +90,22 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         choices=range(SLOWEST_HZ, RATE_HZ + 1),
         default=RATE_HZ,
         metavar='HZ',
-        help='pictures a second; %(default)d by default, 10 where the machine is too busy for that',
+        help='pictures a second (default: %(default)d; 10 relieves a busy machine)',
     )
     parser.add_argument(
-        '--namespace', default='endoscope', help='of the graph (default: %(default)s)'
+        '--namespace', default='endoscope', help='namespace of the graph (default: %(default)s)'
     )
     parser.add_argument(
         '--viewers',
         action='store_true',
-        help='let Foxglove and Lichtblick on this machine read the topics too; they need no token',
+        help='allow Foxglove and Lichtblick on this machine to read the topics, without a token',
     )
     parser.add_argument(
         '--viewers-port',
         type=_port,
         default=DEFAULT_VIEWERS_PORT,
         metavar='PORT',
-        help='0 for any that is free (default: %(default)d)',
+        help='port for viewers; 0 for any that is free (default: %(default)d)',
     )
 
 

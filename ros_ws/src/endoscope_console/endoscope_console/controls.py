@@ -1,4 +1,4 @@
-"""Who has the controls of the slave: the lease, the place at the handle, what ends with them."""
+"""Control of the slave: the lease, the publisher of the handle topics, and what ends with them."""
 
 import asyncio
 import time
@@ -68,11 +68,11 @@ class Controls:
             self._lease_ended(client, 'its page was closed')
 
     def turn(self, now_ns: int) -> None:
-        """End a silent lease, and tell the beat how things are; at a steady time in ns."""
+        """End a silent lease, and update the beat's situation; at a steady time in ns."""
         silent = self.lease.turn(now_ns)
         if silent and self.holder.client is not None:
             why = 'its page was silent for 2 s'
-            self.holder.client.tell({'op': 'lost', 'by': '', 'why': why})
+            self.holder.client.notify({'op': 'lost', 'by': '', 'why': why})
             self._lease_ended(self.holder.client, why)
         if self.holder.moves and not self.holder.waits and self.graph.client.underway is None:
             self.holder.moves = ''
@@ -83,24 +83,24 @@ class Controls:
         if self.attendance.turn(now_ns, session, not session or self._is_attended()):
             client.order('pause')
             self.graph.log('pause', '', '', True, 'nobody operates')
-        self._tell_beat()
+        self._update_beat()
 
     def _is_attended(self) -> bool:
         """Whether anybody operates, here or by another program."""
         if self.lease.holder:
             return True
         other = self.graph.settings.source not in ('', FOLLOW_THE_HANDLE)
-        return not self.place.speaks and (other or bool(self.graph.others_at_the_handle()))
+        return not self.place.publishes and (other or bool(self.graph.others_at_the_handle()))
 
-    def _tell_beat(self) -> None:
+    def _update_beat(self) -> None:
         graph, pictures = self.graph, self.graph.pictures
         self.beat.situation = Situation(
             holder=self.lease.holder,
-            speaks=self.place.speaks and bool(self.lease.holder),
+            publishes=self.place.publishes and bool(self.lease.holder),
             state_enabled=graph.client.state == 'ENABLED' and graph.ended is None,
             state_ns=graph.heard_ns,
             calibrating=graph.client.underway is not None,
-            source=graph.settings.source if self.place.speaks else '',
+            source=graph.settings.source if self.place.publishes else '',
             pictures=pictures.made,
             playing=self.playing.underway,
             session=graph.client.session,
@@ -114,10 +114,10 @@ class Controls:
         return await asyncio.get_running_loop().run_in_executor(self._pool, ask)
 
     async def claim(self, client: Client, take: bool) -> str:
-        """Make a client the operator; what became of it."""
+        """Make a client the operator; returns the answer."""
         if self._closing:
             raise EndoscopeError('the server of the page ends')
-        if self.holds(client) and self.place.speaks:
+        if self.holds(client) and self.place.publishes:
             return ''
         claim = self.lease.claim(client.id, take, time.monotonic_ns())
         if not claim.granted:
@@ -126,29 +126,29 @@ class Controls:
             self._lost(claim.lost_by, client)
         if self.holder.client is not client:
             self.holder = Holder(client)
-        self._tell_beat()
+        self._update_beat()
         async with self.place.lock:
             try:
-                if not self.place.speaks:
+                if not self.place.publishes:
                     await self.place.take(take)
             except BaseException:
                 if self.lease.holder == client.id:
                     self.lease.release(client.id)
                     self.holder = Holder()
-                    self._tell_beat()
+                    self._update_beat()
                 raise
             if self.lease.holder != client.id:
                 self.soon(self._give_back())
                 raise EndoscopeError('the controls were lost meanwhile')
-            self._tell_beat()
+            self._update_beat()
         return ''
 
     def _lost(self, holder: str, to: Client) -> None:
-        """Tell an operator that another took the lease."""
+        """Notify an operator that another took the lease."""
         self._end_what_moves(holder, 'another took the controls')
         lost = self.clients.by_id(holder)
         if lost is not None:
-            lost.tell({'op': 'lost', 'by': to.label, 'why': f'{to.label} took the controls'})
+            lost.notify({'op': 'lost', 'by': to.label, 'why': f'{to.label} took the controls'})
             self.graph.log('lease', lost.id, lost.address, True, f'taken by {to.label}')
 
     def release(self, client: Client) -> str:
@@ -160,23 +160,23 @@ class Controls:
     def _lease_ended(self, client: Client, why: str) -> None:
         self._end_what_moves(client.id, f'its operator lost the controls: {why}')
         self.holder = Holder()
-        self._tell_beat()
+        self._update_beat()
         self.graph.log('lease', client.id, client.address, True, f'ended: {why}')
         self.soon(self._give_back())
 
     def _end_what_moves(self, holder: str, why: str) -> None:
-        """Let nothing that an operator has begun or asked for go on without him."""
+        """End every motion that an operator has started or requested."""
         self.count_halt(why)
         # He may hold the lease again before the next beat looks.
         self.beat.refuse(holder, Reason.LOST, time.monotonic_ns())
         if self.holder.moves:
             self.graph.client.order('pause')
         if self.playing.is_experiment:
-            # The next operator's hand is no hand for what this one had played.
+            # The next operator's grip must not continue what this one had played.
             self.soon(self.playing.end(self.holder))
 
     def soon(self, work: Coroutine[Any, Any, None]) -> None:
-        """Let something be done beside all else, whose end is waited for at the end."""
+        """Run something concurrently; :meth:`close` waits for its end."""
         task = asyncio.get_running_loop().create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
@@ -184,10 +184,10 @@ class Controls:
     async def _give_back(self) -> None:
         """Leave the handle to others, unless somebody has taken the controls meanwhile."""
         async with self.place.lock:
-            if self.lease.holder or not self.place.speaks:
+            if self.lease.holder or not self.place.publishes:
                 return
-            self.place.speaks = False
-            self._tell_beat()
+            self.place.publishes = False
+            self._update_beat()
             await self.ask(self.graph.plants.leave)
             await self.place.give_back()
 
@@ -204,16 +204,16 @@ class Controls:
         holder = self.holder
         if holder.moves:
             raise EndoscopeError(f'{holder.moves} is under way')
-        if self.beat.said.state is DeadManState.ENGAGED:
+        if self.beat.report.state is DeadManState.ENGAGED:
             raise EndoscopeError('let go first: it moves the slave by itself')
         holder.moves, holder.waits = what, True
         try:
-            told = await self.ask(move)
+            answer = await self.ask(move)
             holder.moves = ''
         finally:
             # A wait that timed out has not ended it.
             holder.waits = False
-        return told
+        return answer
 
     def holds(self, client: Client) -> bool:
         return self.lease.holder == client.id
@@ -221,7 +221,7 @@ class Controls:
     def require_rest(self) -> None:
         if self.holder.moves:
             raise EndoscopeError(f'{self.holder.moves} is under way')
-        if self.beat.said.state is DeadManState.ENGAGED:
+        if self.beat.report.state is DeadManState.ENGAGED:
             raise EndoscopeError('let go first')
 
     def relieve(self) -> None:

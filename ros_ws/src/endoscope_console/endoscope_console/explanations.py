@@ -1,4 +1,4 @@
-"""Explanations of recordings on this machine, each in a process of its own that gives way."""
+"""Explanations of recordings on this machine, each in its own process of low priority."""
 
 import json
 import secrets
@@ -25,7 +25,7 @@ _RESULT_FILE = 'report.json'
 EXPERIMENT_FILE = 'next_experiment.csv'
 _STEPS = 7
 """That `endoscope explain` names on the way, for two joints."""
-_TOLD = 20
+_LISTED = 20
 _REMARKS = ('note:', 'audit:')
 _METADATA = 'metadata.yaml'
 PLANT_FILE = 'plant.yaml'
@@ -36,7 +36,7 @@ PLANT_FILE = 'plant.yaml'
 class Explanation:
     """One recording being explained, or explained."""
 
-    id: str  # by which a page speaks of it
+    id: str  # by which a page refers to it
     bag: str  # name of the recording
     folder: Path  # where report and improved plant are
     secret: str  # part of the report's address that nobody can guess
@@ -45,13 +45,13 @@ class Explanation:
     progress: float = 0.0  # share that is done
     sentence: str = ''  # what was found; empty before
     error: str = ''  # why nothing was; empty where something was
-    experiment: bool = False  # there is a motion that would tell more
+    experiment: bool = False  # whether a further experiment was designed
     plant: str = ''  # by which it is explained
     report: str | None = None  # path of its address; None where there is none
     improved: str = ''  # name of the improved plant; empty where there is none
 
     def ended(self, sentence: str = '') -> None:
-        """Take what was found from its folder, in words where the program has said none."""
+        """Read the result from its folder, with its own summary if the program printed none."""
         self.running, self.step, self.progress = False, '', 1.0
         try:
             result = json.loads((self.folder / _RESULT_FILE).read_text('utf-8'))
@@ -69,9 +69,9 @@ class Explanation:
             self.improved = f'{self.folder.name}/{PLANT_FILE}'
 
     def as_mapping(self) -> dict[str, Any]:
-        """What a page is told of it."""
-        told = ('id', 'bag', 'plant', 'running', 'step', 'progress', 'sentence', 'report')
-        values = {key: getattr(self, key) for key in (*told, 'experiment', 'improved')}
+        """Its part of the state that pages receive."""
+        keys = ('id', 'bag', 'plant', 'running', 'step', 'progress', 'sentence', 'report')
+        values = {key: getattr(self, key) for key in (*keys, 'experiment', 'improved')}
         return values | {'error': self.error or None}
 
 
@@ -87,8 +87,8 @@ class Explanations:
             self._new(file.parent.name, file.parent).ended()
 
     def as_list(self) -> list[dict[str, Any]]:
-        """What a page is told of the last twenty, newest first."""
-        return [one.as_mapping() for one in list(self._all.values())[: -_TOLD - 1 : -1]]
+        """The last twenty in the state that pages receive, newest first."""
+        return [one.as_mapping() for one in list(self._all.values())[: -_LISTED - 1 : -1]]
 
     def listing(self) -> dict[str, Any]:
         """Recordings with duration in s and size in bytes, newest first, and plants."""
@@ -123,7 +123,7 @@ class Explanations:
         return None
 
     def experiment_of(self, name: str) -> Path:
-        """File with the motion that would tell more; EndoscopeError if there is none."""
+        """File with the motion of the next experiment; EndoscopeError if there is none."""
         one = self._all.get(name)
         if one is None or not one.experiment:
             raise EndoscopeError(f'there is no experiment of an explanation {name}')
@@ -181,11 +181,11 @@ class Explanations:
         return one
 
     async def _explain(self, one: Explanation, words: list[str]) -> None:
-        said: list[str] = []
+        output: list[str] = []
         done = 0
 
         def take_step(line: str) -> None:
-            """Take a step that it names; the last line of one that fails says why."""
+            """Take a line with a step; the last line of a failure is its reason."""
             nonlocal done
             text = line.strip()
             if text and not text.startswith(_REMARKS):
@@ -193,14 +193,14 @@ class Explanations:
                 one.step, one.progress = text, min(done / _STEPS, 0.95)
 
         try:
-            status = await self._background.run(words, said.append, take_step)
+            status = await self._background.run(words, output.append, take_step)
         except (OSError, ValueError) as error:
             one.running, one.error = False, f'it could not be followed: {error}'
             return
         if status:
             one.running, one.error = False, one.error or one.step
         else:
-            one.ended(said[0] if said else '')
+            one.ended(output[0] if output else '')
 
     async def cancel(self, name: str) -> str:
         """End one that is under way."""

@@ -1,4 +1,4 @@
-"""The server's place in the graph: it hears in one thread, is served in another, asks from any."""
+"""The server's node in the graph: subscribed in one thread, services in another, calls from any."""
 
 import threading
 import time
@@ -71,14 +71,14 @@ def identified(calibration: Health | None) -> bool:
 
 @dataclass(frozen=True)
 class Settings:
-    """What the master was last known to be set to."""
+    """Last known settings of the master."""
 
     source: str = ''  # where its commands come from; empty before it was asked
     scale: float = 1.0  # slave motion for one radian of the handle
 
 
 class GraphSide:
-    """What the server hears of a graph, and asks of it."""
+    """Subscriptions and calls of the server to a graph."""
 
     def __init__(self, client: _Client, pictures: Pictures, services: threading.Thread) -> None:
         self._services = services
@@ -127,11 +127,13 @@ class GraphSide:
     @property
     def plays(self) -> bool:
         """Whether the master moves the slave by itself."""
-        said = self.client.health.get(MASTER)
-        return self.settings.source in PLAYS and (said is None or said.values[FINISHED] != 'True')
+        health = self.client.health.get(MASTER)
+        return self.settings.source in PLAYS and (
+            health is None or health.values[FINISHED] != 'True'
+        )
 
     def others_at_the_handle(self) -> list[str]:
-        """Names of other nodes that speak for the handle; another server of a page has the same."""
+        """Names of other publishers of the handle topics; another page's server has the same."""
         return handle_senders(self.client.node)
 
     def plant(self) -> str:
@@ -154,7 +156,7 @@ class GraphSide:
         set_parameters(self.client, 'compensator', values, PATIENCE_S)
 
     def log(self, order: str, operator: str, address: str, ok: bool, why: str) -> None:
-        """Say in the graph what was asked for and what became of it."""
+        """Publish an order and its outcome in the graph."""
         node = self.client.node
         message = DiagnosticArray()
         message.header.stamp = Time(nanoseconds=time.time_ns()).to_msg()

@@ -1,4 +1,4 @@
-"""The handle's place in the graph, which has room for one, and the master that follows it."""
+"""The handle topics, which have one publisher at a time, and the master that follows them."""
 
 import asyncio
 import time
@@ -34,12 +34,12 @@ class HandlePlace:
 
     def __init__(self, graph: GraphSide, beat: Beat, ask: Ask) -> None:
         self.lock = asyncio.Lock()  # of whoever changes what the master follows
-        self.speaks = False  # the server is the one who speaks for the handle
+        self.publishes = False  # whether this server is the publisher of the handle topics
         self._graph, self._beat, self._ask = graph, beat, ask
         self._found = FOLLOW_THE_HANDLE
 
     async def take(self, take: bool) -> None:
-        """Become the one who speaks for the handle, and have the master follow it."""
+        """Become the publisher of the handle topics, and have the master follow them."""
         graph = self._graph
         settings = graph.settings = await self._ask(self._read_settings)
         if graph.plays and not take:
@@ -51,8 +51,8 @@ class HandlePlace:
         others = [name for name in graph.others_at_the_handle() if name not in own]
         if others:
             raise EndoscopeError(
-                f'{" and ".join(others)} speaks for the handle already; two of them would be a '
-                'fault: end it first'
+                f'the handle topics are already published by {" and ".join(others)}; a second '
+                'publisher would be a fault: end the other first'
             )
         if settings.source != FOLLOW_THE_HANDLE:
             await self._ask(partial(self.set_master, source=FOLLOW_THE_HANDLE))
@@ -62,12 +62,14 @@ class HandlePlace:
             others = graph.others_at_the_handle()
             if others:
                 await self._set_source_back(settings.source)
-                raise EndoscopeError(f'{" and ".join(others)} goes on speaking for the handle')
+                raise EndoscopeError(
+                    f'the handle topics are still published by {" and ".join(others)}'
+                )
             # A session that begins while a node still knows of the old sender ends as a fault.
             await asyncio.sleep(_SETTLED_S)
         self._found = settings.source
         graph.settings = Settings(FOLLOW_THE_HANDLE, settings.scale)
-        self.speaks = True
+        self.publishes = True
 
     def _read_settings(self) -> Settings:
         return Settings(**self.read_master('source', 'scale'))
@@ -84,7 +86,7 @@ class HandlePlace:
     async def give_back(self) -> None:
         """Leave the handle to others, and the master as it was found."""
         end = time.monotonic() + _SILENCED_S
-        while self._beat.said.speaks and time.monotonic() < end:
+        while self._beat.report.publishes and time.monotonic() < end:
             await asyncio.sleep(_LOOK_S)
         await asyncio.sleep(_SETTLED_S)
         source, self._found = self._found, FOLLOW_THE_HANDLE

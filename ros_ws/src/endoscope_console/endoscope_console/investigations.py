@@ -1,4 +1,4 @@
-"""Investigations of the rig: each a command that asks for motions, at the operator's word."""
+"""Investigations of the rig: each a command that requests motions, with the operator's consent."""
 
 import asyncio
 import json
@@ -17,7 +17,7 @@ from endoscope_core.investigation_folder import LOG, PAGE
 
 _ENDED = ('one_class_left', 'nothing_to_gain')
 """After these there is nothing to continue."""
-_TOLD = 5
+_LISTED = 5
 _SENTENCES = 40
 _UNEXPECTED = 'the server of the page failed in it; its terminal says how'
 
@@ -34,15 +34,15 @@ class AskedMotion:
     plant: Path | None  # that the compensator inverts meanwhile; None for no compensation
 
     @classmethod
-    def of(cls, told: Mapping[str, Any]) -> 'AskedMotion':
+    def of(cls, document: Mapping[str, Any]) -> 'AskedMotion':
         """Read it as the command writes it."""
         return cls(
-            told['words'],
-            told['why'],
-            told['duration'],
-            Path(told['file']),
-            Path(told['bag']),
-            Path(told['plant']) if told['plant'] else None,
+            document['words'],
+            document['why'],
+            document['duration'],
+            Path(document['file']),
+            Path(document['bag']),
+            Path(document['plant']) if document['plant'] else None,
         )
 
 
@@ -65,7 +65,7 @@ class Question:
 class Investigation:
     """One investigation, under way or ended."""
 
-    id: str  # by which a page speaks of it
+    id: str  # by which a page refers to it
     folder: Path
     secret: str  # part of its page's address that nobody can guess
     running: bool = False
@@ -95,10 +95,10 @@ class Investigation:
             self.improved = f'{self.folder.name}/{PLANT_FILE}'
 
     def as_mapping(self) -> dict[str, Any]:
-        """What a page is told of it."""
+        """Its part of the state that pages receive."""
         asked = self.question
-        told = ('id', 'running', 'plays', 'step', 'sentence', 'goes_on', 'report', 'improved')
-        return {key: getattr(self, key) for key in told} | {
+        keys = ('id', 'running', 'plays', 'step', 'sentence', 'goes_on', 'report', 'improved')
+        return {key: getattr(self, key) for key in keys} | {
             'name': self.folder.name,
             'sentences': self.sentences[-_SENTENCES:],
             'question': asked and {'id': asked.id, 'words': asked.words, 'why': asked.why},
@@ -119,8 +119,8 @@ class Investigations:
             self._new(file.parent).look()
 
     def as_list(self) -> list[dict[str, Any]]:
-        """What a page is told of the last ones, newest first."""
-        return [one.as_mapping() for one in list(self._all.values())[: -_TOLD - 1 : -1]]
+        """The last ones in the state that pages receive, newest first."""
+        return [one.as_mapping() for one in list(self._all.values())[: -_LISTED - 1 : -1]]
 
     def file_of(self, secret: str) -> Path | None:
         """The page whose address has this part; None for none."""
@@ -163,12 +163,12 @@ class Investigations:
 
     async def _follow(self, one: Investigation, words: list[str], play: Play) -> None:
         def take(line: str) -> None:
-            told = json.loads(line)
-            if 'say' in told:
-                one.sentences.append(told['say'])
+            message = json.loads(line)
+            if 'say' in message:
+                one.sentences.append(message['say'])
             else:
                 one.plays = True
-                motion = AskedMotion.of(told['play'])
+                motion = AskedMotion.of(message['play'])
                 self._asking = asyncio.get_running_loop().create_task(self._ask(one, motion, play))
 
         def take_step(line: str) -> None:
@@ -185,7 +185,7 @@ class Investigations:
         one.look()
 
     async def _ask(self, one: Investigation, motion: AskedMotion, play: Play) -> None:
-        """Have a motion played, and tell the command what became of it."""
+        """Have a motion played, and write its outcome to the command."""
 
         async def consent(words: str) -> bool:
             self._questions += 1
@@ -208,7 +208,7 @@ class Investigations:
             why = str(error)
         finally:
             one.plays, self._asking = False, None
-            self._background.tell(json.dumps({'became': became, 'why': why}))
+            self._background.answer(json.dumps({'became': became, 'why': why}))
 
     def _answer(self, one: Investigation, go: bool) -> None:
         if one.question is not None and not one.question.answer.done():
@@ -236,7 +236,7 @@ class Investigations:
         return ''
 
     async def close(self) -> None:
-        """Let nobody be asked any more, and wait until what was played has ended."""
+        """Withdraw open questions, and wait until the motion being played has ended."""
         for one in self._all.values():
             self._answer(one, False)
         if self._asking is not None:

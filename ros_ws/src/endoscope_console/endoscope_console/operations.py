@@ -1,4 +1,4 @@
-"""What is done for the operator: every order."""
+"""Execution of the operator's orders."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -51,22 +51,22 @@ class Operations:
         self._consented: Client | None = None
 
     async def obey(self, client: Client, order: orders.Order) -> dict[str, Any]:
-        """Do what a client asks for; the answer, in which `ok` and `why` say what became of it."""
+        """Carry out a client's order; returns the answer, with the outcome in `ok` and `why`."""
         answer: dict[str, Any] = {}
         try:
             self._check(client, order)
-            told = await self._carry_out(client, order)
-            if isinstance(told, str):
-                why = told
+            outcome = await self._carry_out(client, order)
+            if isinstance(outcome, str):
+                why = outcome
             else:
-                why, answer = '', dict(told)
+                why, answer = '', dict(outcome)
             ok = True
         except EndoscopeError as error:
             why, ok = str(error), False
             if isinstance(error, RefusedAdoptionError):
                 answer = {'code': error.code}
             self.controls.counts['refused: orders'] += 1
-        # A viewer could fill the recording with what is refused anyhow.
+        # Viewers could fill the recording with refused orders.
         if client.role == OPERATOR and not isinstance(order, orders.Bags):
             self._graph.log(orders.in_words(order), client.id, client.address, ok, why)
         return {'op': 'answer', 'id': order.id, 'ok': ok, 'why': why, **answer}
@@ -157,7 +157,7 @@ class Operations:
         found = client.calibrate(patience_s=PATIENCE_S)
         wanted = '' if client.compensator is None else client.compensator.values.get('wanted_mode')
         # What somebody has chosen stays; and nothing changes under a hand, or after a halt.
-        at_rest = not withdrawn() and self.controls.beat.said.state is not DeadManState.ENGAGED
+        at_rest = not withdrawn() and self.controls.beat.report.state is not DeadManState.ENGAGED
         if first and at_rest and wanted == CompensatorParameters.mode and identified(found):
             self._graph.compensate(PHYSICAL)
             return f'{found.message}; the compensator is {PHYSICAL} now, and was {wanted}'
@@ -174,7 +174,7 @@ class Operations:
         return await self.controls.playing.begin(self.controls.holder, still, file)
 
     async def _adopt(self, plant: str | None) -> str:
-        """Put a plant into force, or the one before; what became of it."""
+        """Put a plant into force, or the one before; returns the outcome."""
         self.controls.require_rest()
         text = '' if plant is None else plant_text(self.explanations.plant_file(plant))
         adopt = partial(self._graph.plants.adopt, text, PATIENCE_S)
@@ -195,7 +195,7 @@ class Operations:
         """Have a motion played under the hand of whoever consents to it."""
 
         def begins() -> tuple[Holder, Callable[[], str]]:
-            if self._consented is not self.controls.operator or not self.controls.place.speaks:
+            if self._consented is not self.controls.operator or not self.controls.place.publishes:
                 raise NotPlayedError('whoever consented has lost the controls')
             self.controls.require_rest()
             return self.controls.holder, self.controls.withdrawn()
@@ -210,7 +210,7 @@ class Operations:
 
     async def _set(self, order: orders.Set) -> str:
         if order.scale is not None:
-            if self.controls.beat.said.state is DeadManState.ENGAGED:
+            if self.controls.beat.report.state is DeadManState.ENGAGED:
                 raise EndoscopeError('the scale changes only while nothing is held')
             await self._ask(partial(self.controls.place.set_master, scale=order.scale))
             self._graph.settings = Settings(self._graph.settings.source, order.scale)

@@ -1,4 +1,4 @@
-"""What an operator's page may ask for, in JSON: one struct an order, and nothing else is read."""
+"""Orders of an operator's page, in JSON: one struct per order; anything else is rejected."""
 
 from typing import Annotated, Literal
 
@@ -21,7 +21,7 @@ class MalformedOrderError(EndoscopeError, ValueError):
 
 
 class Hello(msgspec.Struct, frozen=True, tag='hello', tag_field='op', forbid_unknown_fields=True):
-    """The first words on a socket."""
+    """The first message on a socket."""
 
     token: Annotated[str, msgspec.Meta(max_length=200)]
 
@@ -37,7 +37,7 @@ class Claim(_Order, tag='claim', frozen=True):
 
 
 class Release(_Order, tag='release', frozen=True):
-    """Be the operator no more."""
+    """Give the controls back."""
 
 
 class State(_Order, tag='state', frozen=True):
@@ -68,7 +68,7 @@ class Record(_Order, tag='record', frozen=True):
 
 
 class Mark(_Order, tag='mark', frozen=True):
-    """Keep what happened: the recorder's last seconds, and why."""
+    """Save an event: the recorder's preceding and following seconds, with a reason."""
 
     reason: Annotated[str, msgspec.Meta(max_length=1000)] = ''
 

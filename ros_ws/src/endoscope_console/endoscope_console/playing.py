@@ -1,4 +1,4 @@
-"""What the master plays while the operator holds on: an experiment, a motion that is asked for."""
+"""Motions that the master plays while the dead-man is held: experiments and requested motions."""
 
 import asyncio
 import time
@@ -19,7 +19,7 @@ from endoscope_nodes.client.graph_listener import MASTER, GraphError
 from endoscope_nodes.client.motion_player import MotionPlayer
 from endoscope_nodes.names import FINISHED
 
-# The master tells once a second how far it is; a word from before it was asked means nothing.
+# The master reports its progress once a second; a report from before the request is ignored.
 _NEXT_WORD_NS = 1_500_000_000
 _EXPERIMENT = 'an experiment'
 _INVESTIGATION = 'a motion of an investigation'
@@ -79,12 +79,12 @@ class Playing:
         return self._played is not None
 
     def is_over(self) -> bool:
-        """Whether the master says, since it was asked for an experiment, that it is at the end."""
+        """Whether the master has reported the end of the experiment since it was requested."""
         played = self._played
         if played is None or played.ends:
             return False
-        said = self._graph.client.health.get(MASTER)
-        heard = said is not None and said.values[FINISHED] == 'True'
+        health = self._graph.client.health.get(MASTER)
+        heard = health is not None and health.values[FINISHED] == 'True'
         played.ends = heard and time.monotonic_ns() - played.begun_ns > _NEXT_WORD_NS
         return played.ends
 
@@ -96,7 +96,7 @@ class Playing:
             before = await self._ask(partial(self._place.read_master, *changed))
             if not still() or holder.moves:
                 raise EndoscopeError('the controls were lost or taken to something else')
-            # Said before it is so: whoever loses the controls meanwhile leaves nothing behind.
+            # Set in advance: if the controls are lost meanwhile, this is undone as well.
             holder.moves, holder.waits = _EXPERIMENT, True
             played = self._played = _Played(time.monotonic_ns(), before)
             try:

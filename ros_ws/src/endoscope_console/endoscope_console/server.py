@@ -48,7 +48,7 @@ class Console:
     clients: Clients
     view: View
     tokens: Tokens  # who may do what
-    rig: Rig  # whose limits and measures a page is told
+    rig: Rig  # whose limits and measures pages receive
     counts: Counter[str]  # of what was refused and dropped
     rate: int  # of pictures, in Hz
 
@@ -175,7 +175,7 @@ class Console:
             if not task.cancelled() and (error := task.exception()) is not None:
                 traceback.print_exception(error)
 
-        client.tell = lambda message: start(_tell, socket, message)
+        client.notify = lambda message: start(_send_object, socket, message)
         try:
             while True:
                 message = await socket.receive()
@@ -199,7 +199,7 @@ class Console:
                     await socket.close(_MALFORMED, _short(str(error)))
                     return
         finally:
-            client.tell = _nobody
+            client.notify = _nobody
             self.clients.leave(client)
             self.operations.controls.closed(client)
 
@@ -215,11 +215,13 @@ class Console:
             except Exception:
                 # Its page waits for an answer, whatever has gone wrong here.
                 why = 'the server failed in it; its terminal says how'
-                await _tell(socket, {'op': 'answer', 'id': order.id, 'ok': False, 'why': why})
+                await _send_object(
+                    socket, {'op': 'answer', 'id': order.id, 'ok': False, 'why': why}
+                )
                 raise
             finally:
                 client.orders -= 1
-        await _tell(socket, answer)
+        await _send_object(socket, answer)
 
     async def make_pictures(self) -> None:
         """Hear the graph, and show it to all, until cancelled."""
@@ -227,11 +229,11 @@ class Console:
         while True:
             now_ns = time.monotonic_ns()
             if not self.operations.controls.beat.alive:
-                raise RuntimeError('the thread that speaks for the handle has ended')
+                raise RuntimeError('the thread that publishes the handle topics has ended')
             self.graph.hear(now_ns)
             picture = self.graph.pictures.make(now_ns, time.time_ns())
             self.operations.controls.turn(now_ns)
-            state = self.view.news(now_ns)
+            state = self.view.changes(now_ns)
             watching = self.clients.of('telemetry')
             for client in watching:
                 client.outbox.put_picture(picture)
@@ -261,16 +263,16 @@ def _file(path: Path) -> Callable[[Request], Awaitable[Response]]:
 
 
 def _short(why: str) -> str:
-    """As much of a reason as a socket's last frame has room for."""
+    """As much of a reason as fits into a socket's last frame."""
     return why.encode()[:120].decode(errors='ignore')
 
 
 def _nobody(message: dict[str, object]) -> None:
-    """Say nothing to one that is gone."""
+    """Send nothing to a client that is gone."""
 
 
 async def _send(socket: WebSocket, client: Client) -> None:
-    """Send what waits for a client, one after the other, as fast as it takes it."""
+    """Send a client's queue, one item after the other, as fast as it takes them."""
     try:
         while socket.application_state is WebSocketState.CONNECTED:
             what = await client.outbox.get()
@@ -283,7 +285,7 @@ async def _send(socket: WebSocket, client: Client) -> None:
         return
 
 
-async def _tell(socket: WebSocket, message: Mapping[str, Any]) -> None:
+async def _send_object(socket: WebSocket, message: Mapping[str, Any]) -> None:
     if socket.application_state is WebSocketState.CONNECTED:
         with suppress(WebSocketDisconnect):
             await socket.send_text(json.dumps(message))

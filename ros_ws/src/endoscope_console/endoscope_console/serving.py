@@ -1,4 +1,4 @@
-"""Serves the page from the first word on the terminal to the last: graph, threads, signals."""
+"""Runs the server of the page: graph, threads, signals and messages on the terminal."""
 
 import argparse
 import asyncio
@@ -204,7 +204,7 @@ async def _until_one_ends(tasks: Iterable[asyncio.Task[None]]) -> None:
 async def _announce(
     args: argparse.Namespace, address: str, tokens: Tokens, graph: GraphSide, started: _Graph
 ) -> None:
-    """Print the addresses, have a graph, and say when it answers."""
+    """Print the addresses, ensure a graph, and report when it answers."""
     page = f'{address}/#token={tokens.operator}'
     print(f'operate at    {page}')
     print(f'look on at    {address}/#token={tokens.viewer}', flush=True)
@@ -229,16 +229,16 @@ async def _announce(
 
 
 async def _until_whole(graph: GraphSide, started: _Graph) -> None:
-    """Wait for the streams without which nothing may move, and say for which."""
-    client, end, said = graph.client, time.monotonic() + WHOLE_S, ''
+    """Wait for the streams that motion depends on, and print which are missing."""
+    client, end, printed = graph.client, time.monotonic() + WHOLE_S, ''
     while started.ended is None:
         spoke = SUPERVISOR in client.health
         spoke = spoke and (RECORDER in client.health or 'recorder' not in client.nodes())
         if spoke and not client.awaited:
             return
-        if client.awaited and client.awaited != said:
-            said = client.awaited
-            print(f'waiting       {said}', flush=True)
+        if client.awaited and client.awaited != printed:
+            printed = client.awaited
+            print(f'waiting       {printed}', flush=True)
         if time.monotonic() > end:
             return
         await asyncio.sleep(_LOOK_S)
@@ -255,7 +255,7 @@ class _Sockets(WebSocketsSansIOProtocol):
         plain.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
 
     def keepalive_timeout(self) -> None:
-        """Let go of who does not answer, and of what waits to be sent to him."""
+        """Drop a client that does not answer, and its queue."""
         super().keepalive_timeout()
         self.transport.abort()
 

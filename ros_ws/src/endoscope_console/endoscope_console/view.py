@@ -1,4 +1,4 @@
-"""What all pages are told of the graph, the lease and the dead-man, as one object of JSON."""
+"""The state that all pages receive: graph, lease and dead-man, as one object of JSON."""
 
 import math
 import os
@@ -40,27 +40,27 @@ _encode = msgspec.json.Encoder().encode
 
 
 class View:
-    """Puts the state together, and says when there is news."""
+    """Assembles the state, and detects changes."""
 
     def __init__(self, operations: Operations, rig: Rig, counts: Counter[str], rate: int) -> None:
         self._operations = operations
         self._rig = rig
         self._counts = counts
         self._rate = rate
-        self._told: dict[str, Any] = {}
-        self._told_ns = 0
+        self._sent: dict[str, Any] = {}
+        self._sent_ns = 0
 
-    def news(self, now_ns: int) -> str:
+    def changes(self, now_ns: int) -> str:
         """The state as JSON where it has changed, and once a second; else empty."""
         now = self._steady(now_ns)
-        if now == self._told and now_ns - self._told_ns < _REPEATED_NS:
+        if now == self._sent and now_ns - self._sent_ns < _REPEATED_NS:
             return ''
-        self._told, self._told_ns = now, now_ns
+        self._sent, self._sent_ns = now, now_ns
         return self.whole(now_ns)
 
     def whole(self, now_ns: int) -> str:
         """The whole state as JSON, at a steady time in ns."""
-        steady = self._told or self._steady(now_ns)
+        steady = self._sent or self._steady(now_ns)
         recorder = self._client.health.get(RECORDER)
         return _encode(
             {
@@ -96,10 +96,10 @@ class View:
         return (now_ns - heard_ns) * 1e-9 if heard_ns else None
 
     def _steady(self, now_ns: int) -> dict[str, Any]:
-        """All that is news when it changes."""
+        """The part of the state whose changes are sent at once."""
         operations, client = self._operations, self._client
-        said = operations.controls.beat.said
-        engaged = said.state is DeadManState.ENGAGED
+        dead_man = operations.controls.beat.report
+        engaged = dead_man.state is DeadManState.ENGAGED
         alarms = operations.alarms.update({a.id: a for a in self._alarms(now_ns)})
         settings, pictures, order = self._graph.settings, self._graph.pictures, client.underway
         return {
@@ -117,12 +117,12 @@ class View:
                 ],
             },
             'dead_man': {
-                'state': said.state,
-                'reason': said.reason or '',
-                'missing': said.missing or '',
+                'state': dead_man.state,
+                'reason': dead_man.reason or '',
+                'missing': dead_man.missing or '',
                 'grips': operations.controls.beat.grips,
                 'following': engaged and pictures.wanted is not None and pictures.drives,
-                'counts': said.counts,
+                'counts': dead_man.counts,
             },
             'calibration': {
                 'running': order is not None,
@@ -143,45 +143,46 @@ class View:
         }
 
     def _time(self) -> str:
-        said = self._client.health.get(LOCK_STEP)
-        return 'real' if said is None else f'simulated, {said.message}'
+        health = self._client.health.get(LOCK_STEP)
+        return 'real' if health is None else f'simulated, {health.message}'
 
     def _causes(self) -> list[str]:
-        said = self._client.health.get(SUPERVISOR)
-        text = '' if said is None else said.values.get('present causes', '')
+        health = self._client.health.get(SUPERVISOR)
+        text = '' if health is None else health.values.get('present causes', '')
         return [cause for cause in text.split('; ') if cause]
 
     def _playing(self) -> dict[str, Any] | None:
         if not self._graph.plays:
             return None
-        said = self._client.health.get(MASTER)
+        health = self._client.health.get(MASTER)
         done, length = (
-            None if said is None else _number(said, f'{key} [s]') for key in ('progress', 'length')
+            None if health is None else _number(health, f'{key} [s]')
+            for key in ('progress', 'length')
         )
         share = done / length if done is not None and length else 0.0
         return {'what': self._graph.settings.source, 'progress': share}
 
     def _refused(self) -> str:
-        """Say whose commands are refused rather than obeyed."""
-        said = [self._client.health.get(name) for name in COMMANDS]
-        return next((health.message for health in said if health and health.level == 2), '')
+        """Message about commands that are refused rather than obeyed, if any."""
+        parts = [self._client.health.get(name) for name in COMMANDS]
+        return next((health.message for health in parts if health and health.level == 2), '')
 
     def _nodes(self) -> list[dict[str, Any]]:
         now_ns = time.time_ns()
         nodes: dict[str, dict[str, Any]] = {}
-        for part, said in sorted(self._client.health.items()):
+        for part, health in sorted(self._client.health.items()):
             name, _, subcomponent = part.partition(': ')
-            told = f'{subcomponent}: {said.message}' if said.level else 'ok'
+            message = f'{subcomponent}: {health.message}' if health.level else 'ok'
             node = nodes.setdefault(
                 name, {'name': name, 'level': _LEVELS[0], 'message': 'ok', 'age': math.inf}
             )
-            if _level(said) > _LEVELS.index(node['level']):
-                node |= {'level': _LEVELS[_level(said)], 'message': told}
-            node['age'] = min(node['age'], (now_ns - said.received_ns) * 1e-9)
+            if _level(health) > _LEVELS.index(node['level']):
+                node |= {'level': _LEVELS[_level(health)], 'message': message}
+            node['age'] = min(node['age'], (now_ns - health.received_ns) * 1e-9)
         return list(nodes.values())
 
     def _alarms(self, now_ns: int) -> list[Alarm]:
-        """What asks for attention now."""
+        """Conditions that need attention now."""
         if self._graph.ended is not None:
             # All else follows from it.
             why = f'the graph has ended with status {self._graph.ended}'
@@ -195,7 +196,7 @@ class View:
         recorder = client.health.get(RECORDER)
         compensator = client.compensator
         watch = client.health.get(WATCH)
-        reason = operations.controls.beat.said.reason
+        reason = operations.controls.beat.report.reason
         factor = client.factor
         found = [
             (
@@ -246,7 +247,7 @@ class View:
 
 
 def busy(load: float, cores: int, pace: float | None, rate: int) -> str:
-    """Say by how much a machine is too busy, and what a person can do about it."""
+    """Message that the machine is too busy, by how much, with the remedy."""
     by = f'load {load:.0f} on {_counted(cores)}'
     by += '' if pace is None else f', simulated at {pace:.1f} of real time'
     how = 'close other pages, viewers and programs'
@@ -258,55 +259,55 @@ def _counted(cores: int) -> str:
     return '1 core' if cores == 1 else f'{cores} cores'
 
 
-def _number(said: Health, key: str) -> float | None:
+def _number(health: Health, key: str) -> float | None:
     try:
-        value = float(said.values[key])
+        value = float(health.values[key])
     except (KeyError, ValueError):
         return None
     return value if math.isfinite(value) else None
 
 
-def result(said: Health | None) -> dict[str, Any] | None:
+def result(health: Health | None) -> dict[str, Any] | None:
     """The last calibration, for a person: in degrees."""
-    if said is None:
+    if health is None:
         return None
     size, low, high = (
-        None if (value := _number(said, f'regressed_size{end}')) is None else math.degrees(value)
+        None if (value := _number(health, f'regressed_size{end}')) is None else math.degrees(value)
         for end in ('', '_low', '_high')
     )
     return {
-        'class_deg': _number(said, 'class_deg'),
-        'none': said.values.get('class_deg') == NONE_OF_THEM,
-        'probability': _number(said, 'probability'),
-        'size_deg': _number(said, 'backlash_size_deg') if size is None else size,
+        'class_deg': _number(health, 'class_deg'),
+        'none': health.values.get('class_deg') == NONE_OF_THEM,
+        'probability': _number(health, 'probability'),
+        'size_deg': _number(health, 'backlash_size_deg') if size is None else size,
         'low_deg': low,
         'high_deg': high,
-        'level': _LEVELS[_level(said)],
-        'message': said.message,
+        'level': _LEVELS[_level(health)],
+        'message': health.message,
     }
 
 
-def _level(said: Health) -> int:
-    return min(said.level, len(_LEVELS) - 1)
+def _level(health: Health) -> int:
+    return min(health.level, len(_LEVELS) - 1)
 
 
-def _compensator(said: Health | None) -> dict[str, Any]:
-    values = {} if said is None else said.values
+def _compensator(health: Health | None) -> dict[str, Any]:
+    values = {} if health is None else health.values
     mode = values.get('mode', '')
     return {'mode': mode, 'wanted': values.get('wanted_mode', mode)}
 
 
-def _adopted(told: PlantInForce | None) -> dict[str, Any] | None:
-    """Which adopted plant is in force, in words; None before that is told."""
-    if told is None:
+def _adopted(plant: PlantInForce | None) -> dict[str, Any] | None:
+    """Which adopted plant is in force, in words; None before one is reported."""
+    if plant is None:
         return None
-    return {'hash': told.hash, 'words': told.words, 'undo': bool(told.hash)}
+    return {'hash': plant.hash, 'words': plant.words, 'undo': bool(plant.hash)}
 
 
-def _recorder(said: Health | None) -> dict[str, Any]:
-    bag = '' if said is None else said.values.get(BAG, '')
+def _recorder(health: Health | None) -> dict[str, Any]:
+    bag = '' if health is None else health.values.get(BAG, '')
     return {
         'recording': bool(bag),
         'bag': bag,
-        'message': 'silent' if said is None else said.message,
+        'message': 'silent' if health is None else health.message,
     }

@@ -1,9 +1,9 @@
-"""What other people's viewers see: the topics of a graph for Foxglove and Lichtblick, to be read.
+"""Read-only access to the topics of a graph for Foxglove and Lichtblick.
 
-The server of the Foxglove SDK asks nobody who he is: it looks at neither Origin nor Host and knows
-no token, so every program of this machine, and a page that its browser lets at 127.0.0.1, can read
-along.  That is why it is started only when asked for, listens nowhere else, and offers no
-capability by which anything could be sent to the graph.
+The server of the Foxglove SDK does not authenticate: it checks neither Origin nor Host and knows no
+token, so every program of this machine, and a page whose browser allows it 127.0.0.1, can read the
+topics.  Therefore it is started on request only, listens nowhere else, and offers no capability by
+which anything could be sent to the graph.
 """
 
 import threading
@@ -88,7 +88,7 @@ class ViewedTopic:
         self.channel.log(data, log_time=info['received_timestamp'])
 
     def close(self) -> None:
-        """Hear the topic no more."""
+        """Unsubscribe from the topic."""
         if self._subscription is not None:
             self._subscription.close()
             self._subscription, self._last = None, None

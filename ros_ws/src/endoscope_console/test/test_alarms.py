@@ -46,7 +46,7 @@ def test_a_calibration_that_was_aborted_is_none():
     assert is_calibrated(Health(0, 'class 70 deg', {'class_deg': '70'}, 1, 1))
 
 
-def test_what_fits_no_class_is_told_from_what_was_aborted_with_its_whole_reason():
+def test_a_tube_outside_all_classes_is_distinguished_from_an_abort_with_its_whole_reason():
     reason = 'none of the classes: the tensions are too far from those of all known tubes'
     refused = result(Health(2, reason, {'class_deg': 'none', 'reason': reason}, 1, 1))
     assert (refused['none'], refused['class_deg'], refused['message']) == (True, None, reason)

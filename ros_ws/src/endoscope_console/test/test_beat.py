@@ -15,16 +15,16 @@ NEUTRAL = InputFrame(False, False, True, True, False, 0, 1, 0, 1, 0.0, 0.0, 0.0)
 
 
 class UntilTheLast(deque):
-    """Arrivals; whoever takes the last of them is told what has changed meanwhile."""
+    """Arrivals; taking the last of them triggers a change."""
 
-    def __init__(self, tell):
+    def __init__(self, change):
         super().__init__()
-        self._tell = tell
+        self._change = change
 
     def popleft(self):
         arrival = super().popleft()
         if not self:
-            self._tell()
+            self._change()
         return arrival
 
 
@@ -42,7 +42,7 @@ def test_a_picture_that_was_made_and_seen_while_the_beat_was_held_up_is_known():
     beat._turn(2 * MS)
     beat.hear('c1', replace(NEUTRAL, seq=2, pressed=True, grip=1, t=0.001), 3 * MS)
     beat._turn(3 * MS)
-    assert beat.said.state is DeadManState.ENGAGED
+    assert beat.report.state is DeadManState.ENGAGED
 
     def a_picture_is_made():
         beat.situation = replace(beat.situation, pictures=(*made, (2, 4 * MS)))
@@ -50,4 +50,4 @@ def test_a_picture_that_was_made_and_seen_while_the_beat_was_held_up_is_known():
     beat._arrivals = UntilTheLast(a_picture_is_made)
     beat.hear('c1', replace(NEUTRAL, seq=3, pressed=True, grip=1, seen=2, t=0.002), 4 * MS)
     beat._turn(4 * MS)
-    assert beat.said.state is DeadManState.ENGAGED
+    assert beat.report.state is DeadManState.ENGAGED

@@ -80,7 +80,7 @@ def test_so_many_pages_and_no_more():
     assert counts['refused: too many clients'] == VIEWERS_OF_A_KIND
 
 
-def test_so_many_that_have_not_said_hello():
+def test_so_many_without_a_hello():
     clients = Clients(Counter())
     assert all(clients.knock() for _ in range(UNANSWERED))
     assert not clients.knock()

@@ -74,7 +74,7 @@ def test_random_bytes_are_a_frame_of_finite_numbers_or_refused(data):
 
 
 @pytest.mark.parametrize(
-    ('data', 'said'),
+    ('data', 'message'),
     [
         (b'', '32 bytes, not 0'),
         (encode_input(FRAME)[:-1], '32 bytes, not 31'),
@@ -89,8 +89,8 @@ def test_random_bytes_are_a_frame_of_finite_numbers_or_refused(data):
         (encode_input(replace(FRAME, y=-math.inf)), '-inf'),
     ],
 )
-def test_what_is_no_input_frame_is_refused_and_says_why(data, said):
-    with pytest.raises(MalformedFrameError, match=said.replace('+', r'\+')):
+def test_what_is_no_input_frame_is_refused_with_a_reason(data, message):
+    with pytest.raises(MalformedFrameError, match=message.replace('+', r'\+')):
         decode_input(data)
 
 

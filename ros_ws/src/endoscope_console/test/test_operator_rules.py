@@ -61,8 +61,8 @@ class AnOperator(RuleBasedStateMachine):
 
     def forbidden(self):
         """What forbids motion, whatever the hand does."""
-        page, said, frame = self.page, self.page.conditions, self.newest
-        if frame is None or not said.holder:
+        page, conditions, frame = self.page, self.page.conditions, self.newest
+        if frame is None or not conditions.holder:
             return {Reason.SILENT, Reason.LOST}
         since = page.now - 300 * MS
         sees = any(seq == frame.seen and made >= since for seq, made in page.pictures)
@@ -71,9 +71,9 @@ class AnOperator(RuleBasedStateMachine):
             for reason, holds in (
                 (Reason.HIDDEN, not frame.visible),
                 (Reason.UNFOCUSED, not frame.focused),
-                (Reason.STATE, not said.state_enabled or page.state_age_ns > 3500 * MS),
-                (Reason.CALIBRATION, said.calibrating),
-                (Reason.SOURCE, said.source != 'master' and not said.playing),
+                (Reason.STATE, not conditions.state_enabled or page.state_age_ns > 3500 * MS),
+                (Reason.CALIBRATION, conditions.calibrating),
+                (Reason.SOURCE, conditions.source != 'master' and not conditions.playing),
                 (Reason.BLIND, not sees),
             )
             if holds
@@ -154,23 +154,23 @@ class AnOperator(RuleBasedStateMachine):
             self.judge(before)
 
     def judge(self, before):
-        page, said = self.page, self.page.conditions
+        page, conditions = self.page, self.page.conditions
         stalled = page.now - self.turned > 100 * MS
         silent = page.now - self.arrived >= 100 * MS
         self.turned = page.now
         ends = set()
-        if said.holder != self.holder:
-            self.holder, self.newest, self.hands_off = said.holder, None, False
-            self.quickest.pop(said.holder, None)
+        if conditions.holder != self.holder:
+            self.holder, self.newest, self.hands_off = conditions.holder, None, False
+            self.quickest.pop(conditions.holder, None)
             ends.add(Reason.LOST)
         forbidden = self.forbidden()
-        of_master = said.source, said.playing
+        of_master = conditions.source, conditions.playing
         after = self.dead_man.state
         if before is ENGAGED:
             ends |= forbidden | ({Reason.STALLED} if stalled else set())
             ends |= {Reason.SILENT} if silent else set()
             ends |= {Reason.SOURCE} if of_master != self.of_master else set()
-            ends |= {Reason.STATE} if said.session != self.of_session else set()
+            ends |= {Reason.STATE} if conditions.session != self.of_session else set()
             self.has_ended(ends)
         elif before is OPEN:
             assert after is (READY if self.hands_off and not forbidden else OPEN)
@@ -179,7 +179,7 @@ class AnOperator(RuleBasedStateMachine):
             assert after is ENGAGED
             frame = self.newest
             self.of_grip = frame.grip, frame.source, frame.position_mode
-            self.of_master, self.of_session = of_master, said.session
+            self.of_master, self.of_session = of_master, conditions.session
             EVER[ENGAGED] += 1
         else:
             assert after is (OPEN if forbidden or self.newest.pressed else READY)
@@ -276,16 +276,16 @@ class AnOperator(RuleBasedStateMachine):
 
     @rule(reason=st.sampled_from([Reason.MALFORMED, Reason.FLOOD]), other=st.booleans())
     def what_comes_is_refused(self, reason, other):
-        self.told(reason, 'c3' if other else self.page.client)
+        self.refused(reason, 'c3' if other else self.page.client)
 
     @rule(other=st.booleans())
     def a_page_is_closed(self, other):
         client = 'c3' if other else self.page.client
-        self.told(Reason.CLOSED, client)
+        self.refused(Reason.CLOSED, client)
         for known in (self.seqs, self.quickest, self.grips):
             known.pop(client, None)
 
-    def told(self, reason, client):
+    def refused(self, reason, client):
         before = self.dead_man.state
         if reason is Reason.CLOSED:
             self.dead_man.closed(client)

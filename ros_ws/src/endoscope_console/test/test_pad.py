@@ -29,8 +29,8 @@ class Follower:
     def beat(self, ms=1):
         for _ in range(ms):
             self.now += MS
-            said = self.wanted[0] if self.follows else None
-            angles = self.pad.follow(self.now, self.frame, said, self.scale)
+            wanted = self.wanted[0] if self.follows else None
+            angles = self.pad.follow(self.now, self.frame, wanted, self.scale)
             if self.frame is None:
                 self.reference = None
                 self.wanted.append(None)

@@ -67,19 +67,19 @@ def test_frames_are_those_of_the_server(modules):
         InputFrame(True, False, True, True, False, 0, 1, 2, 3, 12.5, -1.0, 0.25),
         InputFrame(False, True, False, False, True, 2, 2**32 - 1, 2**31, 5, 1e6 + 0.02, 0.0, 3.5),
     ]
-    told = [vars(frame) | {'position': frame.position_mode} for frame in frames]
+    inputs = [vars(frame) | {'position': frame.position_mode} for frame in frames]
     (modules / 'frames.mjs').write_text(FRAMES, encoding='utf-8')
     done = _node(
-        'frames.mjs', folder=modules, input=json.dumps({'picture': picture.hex(), 'inputs': told})
+        'frames.mjs', folder=modules, input=json.dumps({'picture': picture.hex(), 'inputs': inputs})
     )
     assert done.returncode == 0, done.stderr
-    said = json.loads(done.stdout)
-    assert (said['seq'], said['stamp'], said['age']) == (4_000_000_000, 1.7e9 + 0.123, 0.004)
+    shown = json.loads(done.stdout)
+    assert (shown['seq'], shown['stamp'], shown['age']) == (4_000_000_000, 1.7e9 + 0.123, 0.004)
     for name, sent in (('ranges', ranges), ('wanted', wanted), ('actual', actual)):
-        heard = np.array(said[name], dtype=float).reshape(sent.shape)
+        heard = np.array(shown[name], dtype=float).reshape(sent.shape)
         np.testing.assert_array_equal(heard, sent.astype(np.float32))
-    assert said['refused'] == ['RangeError'] * 4
-    assert [decode_input(bytes.fromhex(frame)) for frame in said['inputs']] == frames
+    assert shown['refused'] == ['RangeError'] * 4
+    assert [decode_input(bytes.fromhex(frame)) for frame in shown['inputs']] == frames
 
 
 class _Page(HTMLParser):

@@ -1,4 +1,4 @@
-"""A watch is quiet on a rig that is as described to 10 %, and names the part that changes."""
+"""A watch is quiet on a rig within 10 % of its description, and names the part that changes."""
 
 from dataclasses import replace
 
@@ -43,7 +43,7 @@ def read(plant, setpoint, seed=1):
     )
 
 
-def tell(watch, time, setpoint, seen, part=slice(None), wires=None):
+def feed(watch, time, setpoint, seen, part=slice(None), wires=None):
     at = time[part]
     watch.setpoint.append(at, setpoint[part])
     watch.motor.append(at, np.hstack([seen.shaft_position, seen.shaft_effort])[part])
@@ -56,19 +56,19 @@ def tell(watch, time, setpoint, seen, part=slice(None), wires=None):
 def test_a_rig_that_stays_as_it_is_raises_no_alarm():
     time, setpoint = hand(3)
     watch = RigWatch(described())
-    tell(watch, time, setpoint, read(rig(), setpoint))
+    feed(watch, time, setpoint, read(rig(), setpoint))
     assert watch.ready
     assert watch.alarms == []
     assert watch.margin < 1.0
 
 
-def test_a_cell_that_reads_too_much_is_told_with_its_part_and_time():
+def test_a_cell_that_reads_too_much_is_reported_with_its_part_and_time():
     time, setpoint = hand(3)
     seen = read(rig(), setpoint)
     wires = seen.tension.copy()
     wires[time >= CHANGED_AT, 0, 1] *= 1.2
     watch = RigWatch(described())
-    tell(watch, time, setpoint, seen, wires=wires)
+    feed(watch, time, setpoint, seen, wires=wires)
     (alarm,) = watch.alarms
     assert CHANGED_AT < alarm.at < CHANGED_AT + 10.0
     assert alarm.since == pytest.approx(CHANGED_AT, abs=3.0)
@@ -83,9 +83,9 @@ def test_samples_may_come_in_any_portions():
     time, setpoint = hand(3, 12)
     seen = read(rig(), setpoint)
     whole, pieces = RigWatch(described()), RigWatch(described())
-    tell(whole, time, setpoint, seen)
+    feed(whole, time, setpoint, seen)
     for begin in range(0, len(time), 70):
-        tell(pieces, time, setpoint, seen, slice(begin, begin + 70))
+        feed(pieces, time, setpoint, seen, slice(begin, begin + 70))
     learnt = [joint.test.noise for watch in (whole, pieces) for joint in watch.joints]
     assert whole.joints[0].moved == pieces.joints[0].moved > 10
     # A tracker sample more or less, where a portion of 25 begins anew.
@@ -100,7 +100,7 @@ def test_samples_may_come_in_any_portions():
         (lambda time, motor: (np.where(time > 8.0, time - 7.0, time), motor), 'jumped back'),
     ],
 )
-def test_what_cannot_be_followed_begins_anew_and_is_told(spoil, because):
+def test_what_cannot_be_followed_restarts_and_is_reported(spoil, because):
     time, setpoint = hand(3, 12)
     seen = read(rig(), setpoint)
     watch = RigWatch(described())
@@ -122,7 +122,7 @@ def test_missing_tensions_and_angles_are_no_change():
         bending=np.where(time[:, None] > CHANGED_AT, np.nan, seen.bending),
     )
     watch = RigWatch(described())
-    tell(watch, time, setpoint, gone)
+    feed(watch, time, setpoint, gone)
     assert watch.alarms == []
 
 

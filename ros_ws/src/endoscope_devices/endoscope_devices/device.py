@@ -1,4 +1,4 @@
-"""What a node needs of a device: servos in position mode, or a sensor read by a thread."""
+"""Interfaces of devices: servos in position mode, and sensors that are read by a thread."""
 
 import threading
 import time
@@ -45,9 +45,9 @@ class MotorDevice(Protocol):
         """Connect and check the settings; DeviceError where not reachable, or set up wrongly."""
 
     def set_torque(self, on: bool) -> None:
-        """Let the servos hold where they are and then follow goals, or let them go.
+        """Let the servos hold their position and then follow goals, or switch them off.
 
-        Switching torque on is what ends the refusal of goals after a trouble; nothing else does.
+        After an error goals are refused until torque is switched on again.
         """
 
     def exchange(self, goal: Sequence[float], periods: int) -> MotorReading | None:
@@ -57,20 +57,20 @@ class MotorDevice(Protocol):
         """
 
     def trouble(self) -> str:
-        """What forbids motion now, empty if nothing; asked for in every tick."""
+        """The error that prevents motion, empty if none; called in every tick."""
 
     def health(self) -> dict[str, object]:
         """Figures for diagnostics."""
 
     def close(self) -> None:
-        """Let go of the device."""
+        """Release the device."""
 
 
 class ReadingThread[Reading](ABC):
-    """Reads from `open` to `close`; nobody who takes the readings waits for the device.
+    """Reads from `open` to `close`; taking readings never waits for the device.
 
     `name`: of the thread.
-    `kept`: so many readings wait at most; the oldest gives way to the newest.
+    `kept`: length of the queue; the oldest reading is dropped for the newest.
     """
 
     def __init__(self, name: str, kept: int) -> None:
@@ -92,7 +92,7 @@ class ReadingThread[Reading](ABC):
         return taken
 
     def close(self) -> None:
-        """Stop reading and let go of the device."""
+        """Stop reading and release the device."""
         self._stop.set()
         if self._thread.ident is not None:
             self._thread.join()
@@ -102,7 +102,7 @@ class ReadingThread[Reading](ABC):
         """Read until `_stop` is set."""
 
     def _keep(self, reading: Reading, asked_ns: int) -> None:
-        """Let a good reading be taken that was asked for at `asked_ns` of ``time.monotonic_ns``."""
+        """Queue a good reading that was requested at `asked_ns` of ``time.monotonic_ns``."""
         self._counts['readings'] += 1
         self._good_ns = asked_ns
         self._readings.append(reading)

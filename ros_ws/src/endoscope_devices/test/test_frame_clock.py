@@ -48,7 +48,7 @@ def test_a_late_reply_keeps_the_time_of_its_frame():
     assert clock.stamp(100, 100 * 25 * MS + 300 * MS) == pytest.approx(100 * 25 * MS, abs=MS)
 
 
-def test_a_frame_before_its_time_is_told():
+def test_a_frame_before_its_time_is_reported():
     clock = FrameClock(40.0)
     assert clock.ahead_ns(100, 0) == 0
     clock.stamp(100, 5_000 * MS)

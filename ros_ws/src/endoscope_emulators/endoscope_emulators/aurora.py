@@ -52,7 +52,7 @@ class AuroraEmulator(ClosedOnExit):
     ) -> None:
         self.unit = AuroraUnit(sources, time.monotonic, latency)  # the tracker behind the line
         self.link = link  # to the port; it stays the same when the tracker is plugged in again
-        # What becomes of replies on the way: pieces, each with the seconds that it takes.
+        # What happens to replies on the way: pieces, each with its delay in s.
         self.tap: Callable[[bytes], Sequence[tuple[float, bytes]]] = lambda data: [(0.0, data)]
         self._line_speed = line_speed  # whether bytes take their time
         self._ends: tuple[int, int] | None = None
@@ -174,7 +174,7 @@ class InstrumentInField:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run an emulator in a process of its own until it is told to end."""
+    """Run an emulator in its own process until a signal ends it."""
     parser = argparse.ArgumentParser(
         prog='aurora_emulator', description='An NDI Aurora with one sensor at a pseudo-terminal.'
     )

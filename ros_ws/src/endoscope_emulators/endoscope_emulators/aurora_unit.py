@@ -1,4 +1,4 @@
-"""What an Aurora answers to commands, by NDI's Aurora Application Program Interface Guide.
+"""Replies of an Aurora to commands, by NDI's Aurora Application Program Interface Guide.
 
 Names of commands, replies and errors below are those of the guide's command reference (INIT, COMM,
 PHSR, PHINF, PINIT, PENA, PDIS, PHF, TSTART, TSTOP, BX, TX, VER, APIREV, GETINFO, ECHO, BEEP, LED,
@@ -101,7 +101,7 @@ class AuroraUnit:
         self.baud = BAUD_RATES[0]  # rate that it listens at
 
     def reset(self) -> bytes:
-        """Start anew, as after power-up, a serial break or RESET; what it then says."""
+        """Restart, as after power-up, a serial break or RESET; returns its message."""
         self._mode = _Mode.RESET
         self._ports = {}
         self.frame_zero = self.now()

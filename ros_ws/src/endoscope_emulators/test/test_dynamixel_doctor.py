@@ -1,4 +1,4 @@
-"""What is said of servos on a line that loses packets."""
+"""The doctor's report on servos on a line that loses packets."""
 
 import pytest
 
@@ -26,7 +26,7 @@ def test_a_lost_reply_is_asked_for_again(bus):
     assert any(servo.complete for servo in found)
 
 
-def test_a_reading_that_never_came_is_not_told_as_zero(bus):
+def test_a_missing_reading_is_not_reported_as_zero(bus):
     spoil(bus, 0.4)
     finding = examine(bus.port, [1_000_000])
     while not any(not servo.complete for servo in finding.servos):

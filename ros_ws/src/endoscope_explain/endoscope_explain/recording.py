@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_bags.errors import BagError
-from endoscope_bags.information import losses_told
+from endoscope_bags.information import counted_losses
 from endoscope_bags.joint_state_series import JointStateSeries
 from endoscope_bags.recording import Recording as Bag
 from endoscope_bags.recording import open_bag, rig_of_bag
@@ -306,7 +306,7 @@ def recording_from_bag(
 
     every = [s for s in (command, wires, bending, motor) if s is not None]
     require_common_time(path, every)
-    counted = losses_told(bag)
+    counted = counted_losses(bag)
     origin_ns = min(int(s.stamp_ns.min()) for s in every)
 
     def series(topic: str, source: JointStateSeries, names: Sequence[str], key: str) -> Series:

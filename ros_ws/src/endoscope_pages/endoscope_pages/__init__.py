@@ -1,4 +1,4 @@
-"""What every page of the project is made with: layout, look, tables, plots that can be zoomed."""
+"""Common parts of the project's pages: layout, style, tables, plots that can be zoomed."""
 
 from endoscope_pages.page import ASSETS, html_table, render_page
 from endoscope_pages.plots import Curve, Plot, figure_html

@@ -162,9 +162,9 @@ class Plot:
     diagonal : bool
         Whether a dotted line marks where both axes have the same value.
     shaded : tuple of pairs of float
-        Stretches of `x` that are pointed at.
+        Highlighted intervals of `x`.
     marks : tuple of float
-        Places on `x` that are pointed at.
+        Highlighted places on `x`.
     """
 
     title: str
@@ -194,7 +194,7 @@ def figure_html(plots: Sequence[Plot], caption: str = '') -> str:
     Parameters
     ----------
     plots : sequence of Plot
-        In the order of reading; a plot that a row has no room for begins the next one.
+        In the order of reading; a plot that does not fit into a row begins the next one.
     caption : str, optional
         Below them, escaped here.
 
@@ -253,7 +253,7 @@ def _range(values: Sequence[Array], margin: float, *, log: bool = False) -> list
 
 
 def _spec(plot: Plot, place_of: Any, labelled: bool) -> dict[str, Any]:
-    """What the page's script draws."""
+    """Input of the page's drawing script."""
     labels = [curve.label for curve in plot.curves]
     values = [v for c in plot.curves for v in (c.y, c.low, c.high) if v is not None]
     return {
@@ -289,7 +289,7 @@ def _curve(plot: Plot, curve: Curve, place_of: Any, labels: list[str]) -> dict[s
 
 
 def _lowest(plots: Sequence[Plot]) -> list[bool]:
-    """Which plots have none below them in the same column that names the same across."""
+    """Lowest plots of each column with a common horizontal axis."""
     begins, at = [], 0
     for plot in plots:
         if at + plot.columns > COLUMNS:
@@ -336,7 +336,7 @@ def _tools() -> str:
 
 
 def _numbers(plots: Sequence[Plot]) -> str:
-    """The table that says in numbers what the plots show."""
+    """The table with the numbers of the plots."""
     rows = (
         (plot.title, curve.label, *_figures_of(curve.y)) for plot in plots for curve in plot.curves
     )

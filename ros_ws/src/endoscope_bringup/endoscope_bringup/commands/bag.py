@@ -1,4 +1,4 @@
-"""`endoscope bag`: which recordings there are, what is in one, a stretch of it, saving one."""
+"""`endoscope bag`: lists, describes, cuts and recovers recordings."""
 
 import argparse
 from pathlib import Path
@@ -8,13 +8,15 @@ from endoscope_bringup.subcommands import add_json_option, print_json, within
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `bag` with `list`, `info`, `cut` and `recover`."""
-    parser = subparsers.add_parser('bag', help='look into a recording, cut it, save a damaged one')
+    parser = subparsers.add_parser(
+        'bag', help='describe a recording, cut it, recover a damaged one'
+    )
     actions = parser.add_subparsers(dest='action', metavar='ACTION', required=True)
     listed = actions.add_parser(
         'list',
-        help='the recordings in a folder, with the faults and marks that were kept',
-        description='Lists the recordings in FOLDER, oldest first: what they are, when they begin '
-        'and how long they are, and of those that were kept for a fault or a mark when and why.',
+        help='list the recordings in a folder, with faults and marks',
+        description='Lists the recordings in FOLDER, oldest first: kind, start and length, and for '
+        'those of a fault or a mark its time and reason.',
     )
     listed.add_argument(
         'folder', metavar='FOLDER', type=Path, nargs='?', default=Path('bags'), help='(bags)'
@@ -23,19 +25,19 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     info = actions.add_parser(
         'info',
         help='topics, counts, rates, duration, pauses, gaps and losses',
-        description='Says what is in BAG, and what is missing from it. A periodic topic is silent '
-        'where nothing comes for more than 2.5 periods by the stamps of the source. It paused if '
-        'nothing was published meanwhile, as the master does while it follows no handle; it has a '
-        'gap if messages are missing there, or if nothing tells that none are. Lost are messages '
-        'that were published and did not arrive ("?" where the recorder did not tell).',
+        description='Lists the content of BAG, and what is missing from it. A periodic topic is '
+        'silent where no message comes for more than 2.5 periods by the stamps of the source. It '
+        'paused if nothing was published meanwhile, as the master does while it follows no handle; '
+        'it has a gap if messages are missing there, or if this cannot be excluded. Lost are '
+        'messages that were published and did not arrive ("?" if the recorder did not count them).',
     )
     info.add_argument('bag', metavar='BAG', type=Path, help='rosbag2 folder or .mcap file')
     add_json_option(info)
     cut = actions.add_parser(
         'cut',
-        help='write a stretch of a recording to a new one',
-        description='Writes what was received from one time to another. Of latched topics the last '
-        'message before comes first, so that what was in force is known.',
+        help='write a part of a recording to a new one',
+        description='Writes the messages received between two times. The last earlier message of '
+        'each latched topic comes first.',
     )
     cut.add_argument('bag', metavar='BAG', type=Path, help='rosbag2 folder or .mcap file')
     cut.add_argument(

@@ -23,8 +23,8 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         help='turn a text table of measurements into a bag',
         description='Writes the columns of TABLE, described by a mapping file, as topics of a '
-        'bag. Without\na mapping it says what is in the table:\n\n'
-        '    endoscope convert run.csv                              what is in the table\n'
+        'bag. Without\na mapping it describes the table:\n\n'
+        '    endoscope convert run.csv                              content of the table\n'
         '    endoscope convert run.csv --propose mapping.yaml       a mapping to fill in\n'
         '    endoscope convert run.csv --mapping mapping.yaml --out run',
     )
@@ -52,7 +52,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Convert and write, or say what is in the table; return 0."""
+    """Convert and write, or describe the table; return 0."""
     from endoscope_bags.table_mapping import load_table_mapping
     from endoscope_bags.text_table import convert_table
     from endoscope_bringup.progress_line import ProgressLine

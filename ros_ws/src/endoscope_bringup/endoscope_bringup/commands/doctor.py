@@ -1,4 +1,4 @@
-"""`endoscope doctor`: finds serial ports and servos, and says what to change."""
+"""`endoscope doctor`: finds serial ports and servos, and advises what to change."""
 
 import argparse
 from dataclasses import asdict
@@ -10,7 +10,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `doctor`."""
     parser = subparsers.add_parser(
         'doctor',
-        help='find serial ports and servos, and say what to change',
+        help='find serial ports and servos, and advise what to change',
         description='Looks for Dynamixel servos on serial ports at every speed that they can have '
         '(about a second each), and reports baud, latency timer, firmware, voltage, temperature '
         'and errors. It changes nothing but what --reboot asks for. Exits 1 where there is '

@@ -17,10 +17,10 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser = subparsers.add_parser(
         'effects',
         help='list the physics that a plant.yaml can add to the nominal plant',
-        description='Lists the catalogue and the places for functions that it does not have, or '
-        'tells equation, source and parameters of an effect.',
+        description='Lists the catalogue and the places for functions outside it, or describes '
+        'effects: equation, source and parameters.',
     )
-    parser.add_argument('ids', nargs='*', metavar='ID', help='effects and places to tell all about')
+    parser.add_argument('ids', nargs='*', metavar='ID', help='effects and places to describe')
     parser.add_argument(
         '--plant',
         action='store_true',
@@ -49,11 +49,11 @@ def run(args: argparse.Namespace) -> int:
         )
         return 0
     if chosen:
-        told = [
-            _told_of_place(FUNCTIONS[each.id]) if each.id in FUNCTIONS else _told(each)
+        texts = [
+            _place_text(FUNCTIONS[each.id]) if each.id in FUNCTIONS else _effect_text(each)
             for each in chosen
         ]
-        print('\n\n'.join(told))
+        print('\n\n'.join(texts))
         return 0
     for definition in CATALOGUE.values():
         print(f'{definition.id:22} {definition.stage:13} {definition.physics}')
@@ -113,7 +113,7 @@ def _as_json(definition: 'Effect') -> dict[str, object]:
     }
 
 
-def _told(definition: 'Effect') -> str:
+def _effect_text(definition: 'Effect') -> str:
     return '\n'.join([*_heading(definition), *(_parameter(p) for p in definition.parameters)])
 
 
@@ -124,7 +124,7 @@ def _heading(definition: 'Effect') -> list[str]:
     return lines
 
 
-def _told_of_place(place: 'Place') -> str:
+def _place_text(place: 'Place') -> str:
     argument, unit = place.argument, '' if place.unit == '-' else f' {place.unit}'
     f = f'f({argument.symbol})'
     reach = f'{argument.low:g} to {argument.high:g} {argument.unit}'

@@ -18,7 +18,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `explain`."""
     parser = subparsers.add_parser(
         'explain',
-        help='say where a recording and its simulation differ, and what was left out',
+        help='find where a recording and its simulation differ, and which physics is missing',
         description='Explains what the simulation P.yaml leaves out of each recording BAG. Writes '
         'report.json, report.html and the improved plant, plant.yaml, to DIR; with several bags to '
         'one folder each in DIR, and a summary table.',
@@ -29,13 +29,13 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         type=Path,
         required=True,
         metavar='P.yaml',
-        help='the simulation that is to be compared',
+        help='plant of the simulation to compare',
     )
     parser.add_argument(
         '--rig',
         type=Path,
         metavar='rig.yaml',
-        help='the rig that was recorded, where the bag does not say it (default: as shipped)',
+        help='rig file, if the bag contains none (default: the shipped rig)',
     )
     parser.add_argument(
         '--out', type=Path, required=True, metavar='DIR', help='a new or empty folder'
@@ -44,15 +44,15 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         '--baseline',
         type=Path,
         metavar='BAG0',
-        help='a healthy recording of the same rig: only what is new is explained',
+        help='healthy recording of the same rig: only what is new is explained',
     )
     parser.add_argument(
         '--validate',
         action='append',
         type=Path,
         metavar='BAG2',
-        help='a second recording of the same rig to judge the fit on; give it once for all bags or '
-        'once for each',
+        help='second recording of the same rig for validation; give it once for all bags or once '
+        'for each',
     )
     parser.add_argument(
         '--without',
@@ -63,34 +63,34 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         help='a topic that may be missing',
     )
     parser.add_argument(
-        '--namespace', metavar='NS', help="of the rig's topics, where a bag has several rigs"
+        '--namespace', metavar='NS', help="namespace of the rig's topics, if a bag has several rigs"
     )
     parser.add_argument(
         '--band',
         type=within(1e-6, 100.0, float),
         default=0.15,
         metavar='SHARE',
-        help="by which share the plant's parameters may differ from the rig's: 3 for a rig that "
-        'was never identified (default 0.15)',
+        help="prior tolerance of the plant's parameters, as a share: 3 for a rig that was never "
+        'identified (default 0.15)',
     )
     parser.add_argument(
         '--effects',
         type=COUNT,
         default=2,
         metavar='N',
-        help='how many effects to look for on a joint at most: 4 for a rig that the plant never '
-        'matched (default 2)',
+        help='largest number of effects of a joint: 4 for a rig that the plant never matched '
+        '(default 2)',
     )
     parser.add_argument(
         '--same-physics',
         action='store_true',
-        help='all bags show one rig, in other shapes or at other times: choose the effects that '
-        'explain all of them together',
+        help='all bags are of one rig, in other shapes or at other times: choose effects for all '
+        'of them together',
     )
     parser.add_argument(
-        '--jobs', type=COUNT, default=2, metavar='N', help='tasks side by side (default 2)'
+        '--jobs', type=COUNT, default=2, metavar='N', help='parallel tasks (default 2)'
     )
-    parser.add_argument('--quick', action='store_true', help='leave out the next experiment')
+    parser.add_argument('--quick', action='store_true', help='do not design a next experiment')
     add_json_option(parser)
 
 

@@ -1,4 +1,4 @@
-"""`endoscope investigate`: a rig moves, is explained, and is asked what tells the rest apart."""
+"""`endoscope investigate`: moves a rig, explains it, and plays discriminating experiments."""
 
 import argparse
 from collections.abc import Callable, Iterator
@@ -20,60 +20,61 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `investigate`."""
     parser = subparsers.add_parser(
         'investigate',
-        help='move a rig, explain it, and play what tells the rest apart, until it is explained',
+        help='move a rig, explain it, and play motions that discriminate between the alternatives',
         description='Plays the commissioning motion on a running graph and explains the recording '
-        'by the plant P.yaml. As long as an effect has rivals, or its strength a wide interval, '
-        'plays the safe motion that tells most, and explains all recordings together. Writes bags, '
-        'log.json, log.md, index.html and the improved plant, plant.yaml, to DIR as it goes. The '
-        'same command on the same DIR continues what was interrupted. Each motion is asked for, '
-        'has a motion session of its own, and is refused beyond the limits of rig.yaml. Ctrl-C '
-        'pauses the graph. Exits 0 at the end, 1 if the rig or a person stopped it, 130 when '
-        'interrupted.',
+        'with the plant P.yaml. As long as an effect has alternatives, or a wide interval of its '
+        'strength, plays the safe motion that discriminates best, and explains all recordings '
+        'together. Writes bags, log.json, log.md, index.html and the improved plant, plant.yaml, '
+        'to DIR meanwhile. The same command on the same DIR continues an interrupted '
+        'investigation. Each motion needs consent, has its own motion session, and is refused '
+        'beyond the limits of rig.yaml. Ctrl-C pauses the graph. Exits 0 at the end, 1 if the rig '
+        'or a person stopped it, 130 when interrupted.',
     )
     parser.add_argument(
-        '--plant', type=Path, required=True, metavar='P.yaml', help='the plant as described'
+        '--plant', type=Path, required=True, metavar='P.yaml', help='plant of the rig'
     )
     parser.add_argument(
         '--out',
         type=Path,
         required=True,
         metavar='DIR',
-        help='a new or empty folder, or one that is to be continued',
+        help='new or empty folder, or that of an investigation to continue',
     )
     parser.add_argument(
         '--experiments',
         type=within(0, 100, int),
         default=4,
         metavar='N',
-        help='at most so many motions after the commissioning motion, which is not counted '
-        '(default 4)',
+        help='largest number of motions after the commissioning motion (default 4)',
     )
     parser.add_argument(
         '--attended',
         action='store_true',
-        help='somebody stands at the rig with a hand on its emergency stop: motions are not asked '
-        'for one by one',
+        help='an operator stands at the rig with a hand on its emergency stop: motions need no '
+        'individual consent',
     )
     parser.add_argument(
         '--lines',
         action='store_true',
-        help='another program plays: a line of JSON on the output asks for each motion, and one on '
-        'the input says what became of it, as endoscope console does',
+        help='JSON-lines protocol on stdin/stdout: another program plays the motions, as endoscope '
+        'console does',
     )
     parser.add_argument(
         '--simulate',
         type=Path,
         metavar='SLAVE.yaml',
-        help='no running graph, but one on the slave that this plant describes, in simulated time',
+        help='start a simulated graph with this plant, in simulated time',
     )
     parser.add_argument(
         '--rig', type=Path, metavar='rig.yaml', help='the rig and its limits (default: as shipped)'
     )
     parser.add_argument(
-        '--namespace', default='endoscope', help='of the running graph (default: %(default)s)'
+        '--namespace',
+        default='endoscope',
+        help='namespace of the running graph (default: %(default)s)',
     )
     parser.add_argument(
-        '--jobs', type=COUNT, default=2, metavar='N', help='tasks side by side (default 2)'
+        '--jobs', type=COUNT, default=2, metavar='N', help='parallel tasks (default 2)'
     )
 
 
@@ -132,7 +133,7 @@ def _asked(words: str) -> bool:
 
 @contextmanager
 def _graph(args: argparse.Namespace, rig: 'Rig') -> Iterator['GraphClient']:
-    """The running graph, or one on a simulated slave where none runs or none is wanted."""
+    """The running graph, or a simulated one if none runs or --simulate is given."""
     from endoscope_nodes.client.graph_client import joined_graph
     from endoscope_nodes.client.graph_listener import GraphError
 

@@ -1,4 +1,4 @@
-"""`endoscope operate`: asks a running graph for something and prints its answer."""
+"""`endoscope operate`: sends a request to a running graph and prints its answer."""
 
 import argparse
 
@@ -11,27 +11,27 @@ _ACTIONS = {
     'status': 'state and why, session, health of every node, model, last calibration, recorder, '
     'console',
     'enable': 'let the slave move: opens a motion session; waits for ENABLED',
-    'disable': 'end the session and let go of the motors, in any state; waits for DISABLED',
+    'disable': 'end the session and switch the motors off, in any state; waits for DISABLED',
     'home': 'move the motors back to zero; waits until they are there',
     'pause': 'end the session and hold the slave where it is; waits for PAUSED',
-    'resume': 'go on after a pause; waits for ENABLED',
+    'resume': 'continue after a pause; waits for ENABLED',
     'calibrate': 'find the hysteresis class of the tube by a motion of some 10 s; waits for the '
     'result',
     'adopt': 'compensate by an improved plant, as `endoscope explain` writes it: at rest, in the '
     'session that is open; --undo: by the plant before',
-    'tare': 'take the tension of the last second for zero; wires slack, shafts at rest',
-    'register_straight': "take the tracker's pose of the last second for straight",
+    'tare': 'set the mean tension of the last second as zero; wires slack, shafts at rest',
+    'register_straight': "register the tracker's pose of the last second as straight",
     'reboot': 'restart the servos without torque; not while the slave is ENABLED',
-    'watch': 'have the watch forget its alarms, and learn the rig anew',
-    'set': 'give a node a new value of a parameter',
+    'watch': 'restart change detection: clear its alarms and learn the rig again',
+    'set': 'set a parameter of a node',
     'get': "print a parameter's value, or all parameters of a node with values and ranges",
-    'record': 'begin or end a recording; or mark this moment, with TEXT: what came before and the '
-    '2 s after become a bag',
+    'record': 'start or stop a recording; or mark this moment, with TEXT: the preceding seconds '
+    'and the following 2 s become a bag',
 }
 _INTERRUPTED = (
-    'Ctrl-C, SIGTERM or a terminal that is closed pauses the graph: the slave holds where it is, '
-    'and nothing goes on unattended; `resume` lets it move again. Only a kill -9 of this command '
-    'leaves the motion to the graph, which ends it by itself.'
+    'Ctrl-C, SIGTERM or closing the terminal pauses the graph: the slave holds its position, and '
+    'no motion continues unattended; `resume` continues. Only after a kill -9 of this command does '
+    'the motion run to its end in the graph.'
 )
 
 
@@ -39,9 +39,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `operate`."""
     parser = subparsers.add_parser(
         'operate',
-        help='enable, calibrate, set parameters, record: ask a running graph, print its answer',
-        description='Asks a running graph for something and prints its answer in a line. Exits 0 '
-        'when it is done, 1 when the graph refuses it or it is not reached in time, 2 for wrong '
+        help='enable, calibrate, set parameters, record on a running graph',
+        description='Sends a request to a running graph and prints its answer in a line. Exits 0 '
+        'when it is done, 1 when the graph refuses it or does not answer in time, 2 for wrong '
         'usage, 130 when interrupted.',
     )
     common = argparse.ArgumentParser(add_help=False)

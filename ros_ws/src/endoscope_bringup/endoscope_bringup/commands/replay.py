@@ -11,14 +11,14 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'replay',
         help="publish a bag's topics at their pace or faster, with /clock",
         description='Publishes the recorded messages in the order of their receipt. Refuses to '
-        'talk into a running system: use a ROS_DOMAIN_ID of its own.',
+        'publish into a running system: use a separate ROS_DOMAIN_ID.',
     )
     parser.add_argument('bag', metavar='BAG', help='rosbag2 folder or .mcap file')
     parser.add_argument(
         '--speed',
         type=within(0.01, 100.0, float),
         default=1.0,
-        help='recorded seconds in a real one, 0.01 to 100 (default: %(default)g)',
+        help='recorded seconds per real second, 0.01 to 100 (default: %(default)g)',
     )
     parser.add_argument(
         '--topics', nargs='+', metavar='TOPIC', help='only these (full names; default: all)'

@@ -7,7 +7,7 @@ from pathlib import Path
 from endoscope_bringup.subcommands import seed
 
 WORTH_SAYING = 0.02
-"""What a table may be off from its formula without a word, as a share of what that spans."""
+"""Largest error of a formula's table without a warning, as a share of the formula's range."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
@@ -39,7 +39,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         '--rig',
         type=Path,
         metavar='rig.yaml',
-        help='the rig, where the bag does not say it (default: as shipped)',
+        help='rig file, if the bag contains none (default: the shipped rig)',
     )
     parser.add_argument(
         '--noise',

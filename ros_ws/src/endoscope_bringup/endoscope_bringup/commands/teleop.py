@@ -10,15 +10,15 @@ keys:
   [ ]                  slower, faster
   E                    enable, or resume after a pause: a session is opened, nothing moves yet
   P                    pause: the session ends, the slave holds where it is
-  H                    home while held: the motors go back to zero; let go before they are
-                       there and the graph is paused
+  H                    home while held: the motors go back to zero; if it is released before
+                       they are there, the graph is paused
   Q, Ctrl-C, Ctrl-Z    quit
   space, any other     stop
 
 A held key is the dead-man, by its repeats: the slave moves from the first one, which comes after
 the keyboard's own delay of 0.25 to 0.66 s, and stops 0.15 s after the last one; a keyboard that
-repeats before 0.18 or after 0.7 s moves nothing. After a stop that was no release the key has to be
-let go of and pressed again.
+repeats before 0.18 or after 0.7 s moves nothing. After a stop without a release the key has to be
+released and pressed again.
 
 The slave follows while the graph is ENABLED and `master.source` is `master`, which is set with
 your consent and set back at the end. Whatever ends this program, the clutch is released first: Q,
@@ -44,7 +44,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         type=within(3.0, 57.0, float),
         default=17.0,
         metavar='DEG_S',
-        help='of the handle at the start, 3 to 57 deg/s (default: %(default)g)',
+        help='initial speed of the handle, 3 to 57 deg/s (default: %(default)g)',
     )
     parser.add_argument(
         '--scale',

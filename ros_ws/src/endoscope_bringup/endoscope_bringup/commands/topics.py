@@ -1,4 +1,4 @@
-"""`endoscope topics`: which topics there are, what is missing, and what they say."""
+"""`endoscope topics`: lists the topics, missing publishers, and messages."""
 
 import argparse
 
@@ -9,12 +9,12 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     """Add `topics`."""
     parser = subparsers.add_parser(
         'topics',
-        help="the graph's topics on the wire: who speaks and listens, what is missing",
+        help="list the graph's topics with publishers and subscribers, and what is missing",
         description='Without options lists the topics of the interface with their senders and '
-        'readers, and says what is missing. Exits 0, or 1 where nobody sends what was asked for.',
+        'readers, and what is missing. Exits 0, or 1 if a requested topic has no sender.',
     )
     parser.add_argument(
-        '--echo', metavar='NAME', help='print what a topic says, each message as a line of JSON'
+        '--echo', metavar='NAME', help='print the messages of a topic, each as a line of JSON'
     )
     parser.add_argument('--once', action='store_true', help='with --echo: only one message')
     parser.add_argument('--count', type=COUNT, metavar='N', help='end after N messages')

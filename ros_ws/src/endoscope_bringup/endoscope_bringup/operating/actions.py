@@ -54,8 +54,8 @@ def act(client: GraphClient, args: argparse.Namespace) -> Reply:
             bag = client.mark(args.text, patience_s)
             return Reply((f'marked: what led to it goes to {bag}',), {'bag': bag})
         service = names.RECORDER_START if args.what == 'start' else names.RECORDER_STOP
-        said = client.trigger(service, patience_s)
-        return Reply((f'recording to {said}' if args.what == 'start' else said,))
+        answer = client.trigger(service, patience_s)
+        return Reply((f'recording to {answer}' if args.what == 'start' else answer,))
     client.find(patience_s)
     if action in _OF_A_DEVICE:
         return Reply((client.trigger(_OF_A_DEVICE[action], patience_s),))
@@ -95,7 +95,7 @@ def _calibrate(client: GraphClient, patience_s: float) -> Reply:
         with ProgressLine() as bar:
             result = client.calibrate(bar.show, patience_s)
     except GraphError as error:
-        # An aborted calibration tells what it saw: the session ended. The supervisor knows why.
+        # An aborted calibration reports that the session ended. The supervisor knows why.
         if client.state == 'FAULT' and client.wait_until(lambda: bool(client.why), patience_s):
             raise GraphError(f'{error} ({client.state}: {client.why})') from error
         raise
@@ -140,26 +140,26 @@ def _set(client: GraphClient, name: str, text: str, patience_s: float) -> Reply:
     node, value = parameter.node, parameter.parse(text)
     set_parameters(client, node, {parameter.name: value}, patience_s)
     now = read_parameter(client, name, patience_s).value
-    # What a node thinks of it, it says within a second.
+    # A node reports an error with the value within a second.
     client.hear()
     before_ns = client.heard_ns.get(node, 0)
     client.wait_until(lambda: client.heard_ns.get(node, 0) > before_ns, _NEXT_WORD_S)
-    troubles = {
-        part: said.message
-        for part, said in client.health.items()
-        if part.partition(':')[0] == node and said.level
+    errors = {
+        part: health.message
+        for part, health in client.health.items()
+        if part.partition(':')[0] == node and health.level
     }
     return Reply(
         (
             f'{name} = {_in_words(now)}, was {_in_words(parameter.value)}',
-            *(f'    {part}: {message}' for part, message in troubles.items()),
+            *(f'    {part}: {message}' for part, message in errors.items()),
         ),
         {
             'node': node,
             'parameter': parameter.name,
             'value': _of_json(now),
             'was': _of_json(parameter.value),
-            'troubles': troubles,
+            'troubles': errors,
         },
     )
 
@@ -175,7 +175,7 @@ def _in_words(value: Any) -> str:
 
 @contextmanager
 def paused_when_interrupted(client: GraphClient, moving: bool) -> Iterator[None]:
-    """Pause the graph if the block is ended by SIGINT, SIGTERM or SIGHUP while it has it move."""
+    """Pause the graph if SIGINT, SIGTERM or SIGHUP ends the block during a motion."""
 
     def unwind(number: int, frame: FrameType | None) -> None:
         raise SystemExit(_HUNG_UP)

@@ -1,4 +1,4 @@
-"""Who sends and reads each topic, what is missing, and what one says."""
+"""Senders and readers of each topic, missing ones, and the messages of a topic."""
 
 import json
 import math
@@ -51,7 +51,7 @@ def _row(client: GraphClient, name: str, topic: Topic | None) -> dict[str, Any]:
     senders = _senders(client, name)
     missing = []
     if topic is not None and topic.said_by != ('every node',):
-        # A master without a source of motion, and clocks of real time, have nothing to say.
+        # A master without a source of motion, and clocks of real time, publish nothing.
         missing = [n for n in topic.said_by if n in client.nodes() and n not in senders]
     return {
         'topic': name,
@@ -66,7 +66,7 @@ def _missing(topic: Topic | None, senders: list[str], silent: list[str]) -> str:
     if topic is None:
         return ''
     if topic.one_sender and len(senders) > 1:
-        return 'more than the one sender that it has'
+        return 'competing senders: only one is allowed'
     if senders or topic.name == '/clock':
         return ''
     if silent:

@@ -1,4 +1,4 @@
-"""Motions that another program plays: named and answered in lines of JSON."""
+"""JSON-lines protocol on stdin/stdout by which another program plays the motions."""
 
 import json
 from pathlib import Path
@@ -9,13 +9,13 @@ from endoscope_explain.investigation.motions import Motion
 
 
 class MotionsByLines:
-    """Asks for each motion in a line, and goes on with what the line says that answers it."""
+    """Writes a request for each motion as a line, and reads its outcome from the line in reply."""
 
     def __init__(self, asked: TextIO, answers: TextIO) -> None:
         self._asked, self._answers = asked, answers
 
     def say(self, sentence: str) -> None:
-        """Say a sentence of the log."""
+        """Write a sentence of the log."""
         self._write({'say': sentence})
 
     def play(self, motion: Motion, file: Path, bag: Path, plant: Path | None = None) -> None:
@@ -41,5 +41,5 @@ class MotionsByLines:
         if became != 'played':
             raise EndoscopeError(why)
 
-    def _write(self, told: dict[str, object]) -> None:
-        print(json.dumps(told), file=self._asked, flush=True)
+    def _write(self, message: dict[str, object]) -> None:
+        print(json.dumps(message), file=self._asked, flush=True)

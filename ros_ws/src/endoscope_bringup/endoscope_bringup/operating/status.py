@@ -1,4 +1,4 @@
-"""What a graph says of itself, for a person and for a program."""
+"""Status of a graph, for a person and for a program."""
 
 import math
 from collections.abc import Iterable
@@ -33,20 +33,20 @@ from endoscope_nodes.program import NODES
 
 _LEVELS = ('ok', 'WARN', 'ERROR', 'STALE')
 _FULL_ROUND_S = 1.1
-# It says nothing on /diagnostics.
+# It publishes nothing on /diagnostics.
 _QUIET = ('replay',)
 _NOT_HEARD = 'not heard'
 
 
 def status_of(client: GraphClient, patience_s: float) -> tuple[tuple[str, ...], dict[str, Any]]:
-    """Listen until every node has spoken, at most for so many seconds; what they say."""
+    """Wait for the diagnostics of every node, for at most so many seconds; returns the status."""
     kinds: list[str] = []
 
     def note(data: bytes, _: int) -> None:
         kinds.append(str(kind_from_text(deserialize_message(data, String).data)))
 
     client.listen(String, RIG_KIND, note, latched=True)
-    # Nodes speak once a second; those that are found last would be missed otherwise.
+    # Nodes publish once a second; those that are found last would be missed otherwise.
     client.wait_until(lambda: False, _FULL_ROUND_S)
     client.wait_until(lambda: not _not_heard(client), patience_s)
     health, not_heard = client.health, _not_heard(client)
@@ -60,8 +60,8 @@ def status_of(client: GraphClient, patience_s: float) -> tuple[tuple[str, ...], 
         'time': {'simulated': _is_simulated(health), FACTOR: client.factor},
         'rig': {'kind': kinds[-1] if kinds else None, **_in_force(health)},
         'nodes': {
-            name: {'level': _LEVELS[said.level], 'message': said.message, 'values': said.values}
-            for name, said in sorted(health.items())
+            name: {'level': _LEVELS[part.level], 'message': part.message, 'values': part.values}
+            for name, part in sorted(health.items())
         },
         'not_heard': not_heard,
         'compensator': _of_json(client.compensator),
@@ -97,8 +97,8 @@ def _not_heard(client: GraphClient) -> list[str]:
     ]
 
 
-def _of_json(said: Health | None) -> dict[str, Any] | None:
-    return None if said is None else asdict(said)
+def _of_json(health: Health | None) -> dict[str, Any] | None:
+    return None if health is None else asdict(health)
 
 
 def _entry(title: str, lines: Iterable[str]) -> list[str]:
@@ -116,11 +116,11 @@ def _state(client: GraphClient) -> str:
 
 
 def _is_simulated(health: dict[str, Health]) -> bool | None:
-    """Whether time is; None where nobody has said so."""
+    """Whether time is simulated; None if unknown."""
     if LOCK_STEP in health:
         return True
-    said = health.get(SUPERVISOR)
-    return None if said is None else said.values[TIME] == 'simulated'
+    supervisor = health.get(SUPERVISOR)
+    return None if supervisor is None else supervisor.values[TIME] == 'simulated'
 
 
 def _time(health: dict[str, Health]) -> str:
@@ -133,9 +133,9 @@ def _time(health: dict[str, Health]) -> str:
 
 def _in_force(health: dict[str, Health]) -> dict[str, float]:
     """Gear and limits by which the supervisor runs; empty before it is heard."""
-    said = health.get(SUPERVISOR)
-    found = (GEAR, REACH, SPEED, CEILING) if said is not None else ()
-    return {name: float(said.values[name]) for name in found if said is not None}
+    supervisor = health.get(SUPERVISOR)
+    found = (GEAR, REACH, SPEED, CEILING) if supervisor is not None else ()
+    return {name: float(supervisor.values[name]) for name in found if supervisor is not None}
 
 
 def _limits(health: dict[str, Health]) -> list[str]:
@@ -149,35 +149,35 @@ def _limits(health: dict[str, Health]) -> list[str]:
     return [words]
 
 
-def _master(source: str, said: Health | None) -> str:
-    if said is None:
+def _master(source: str, master: Health | None) -> str:
+    if master is None:
         return _NOT_HEARD
-    return f'source {source}' + (f': {said.message}' if said.message != source else '')
+    return f'source {source}' + (f': {master.message}' if master.message != source else '')
 
 
-def _recorder(said: Health | None) -> str:
-    if said is None:
+def _recorder(recorder: Health | None) -> str:
+    if recorder is None:
         return _NOT_HEARD
-    if not said.values.get(BAG):
-        return said.message
-    counts = f'{said.values["messages"]} messages, {said.values["lost"]} lost'
-    return f'{said.message} to {said.values[BAG]}, {counts}'
+    if not recorder.values.get(BAG):
+        return recorder.message
+    counts = f'{recorder.values["messages"]} messages, {recorder.values["lost"]} lost'
+    return f'{recorder.message} to {recorder.values[BAG]}, {counts}'
 
 
 def _nodes(health: dict[str, Health]) -> list[str]:
     lines = []
     for node in sorted({name.partition(':')[0] for name in health}):
         parts = {
-            name.partition(': ')[2]: said
-            for name, said in health.items()
+            name.partition(': ')[2]: status
+            for name, status in health.items()
             if name.partition(':')[0] == node
         }
-        troubles = [
-            f'{_LEVELS[said.level]} {part}: {said.message}'
-            for part, said in parts.items()
-            if said.level
+        errors = [
+            f'{_LEVELS[status.level]} {part}: {status.message}'
+            for part, status in parts.items()
+            if status.level
         ]
-        lines.append(f'{node:<13} {"; ".join(troubles) or "ok"}')
+        lines.append(f'{node:<13} {"; ".join(errors) or "ok"}')
     return lines
 
 

@@ -45,7 +45,7 @@ _SPEEDS = {'[': 1.0 / _FASTER, ']': _FASTER}
 
 @dataclass(frozen=True)
 class Turn:
-    """What the keyboard says at one turn."""
+    """State of the keyboard at one turn."""
 
     position: tuple[float, ...]  # angles of the handle, rad, (J,)
     clutch: bool  # whether it is held
@@ -58,7 +58,7 @@ class KeyboardHandle:
     """A handle one of whose angles runs at a constant speed while a key is held.
 
     A held key is the dead-man: the handle runs from the first repeat of a key until `REPEAT_NS`
-    after the last one, or until any other key is pressed. Then the key has to be let go of and
+    after the last one, or until any other key is pressed. Then the key has to be released and
     pressed again.
     """
 
@@ -85,7 +85,7 @@ class KeyboardHandle:
         wanted: Sequence[float] | None = None,
         scale: float = 1.0,
     ) -> Turn:
-        """Take what was typed since the last turn, and say what the handle does now.
+        """Take the keys typed since the last turn, and return the handle's state.
 
         `hindrance` is what forbids motion, empty for nothing; `wanted` (J,) what the master asks
         of the slave now, in rad, None while it follows nobody: the handle does not move before it
@@ -126,7 +126,7 @@ class KeyboardHandle:
         return None if repeated else _REQUESTS.get(key)
 
     def _repeat(self, now_ns: int, key: str) -> None:
-        """Tell a key that is held by its repeats: the second time is the first of them."""
+        """Detect a held key by its repeats: the second time is the first of them."""
         apart = now_ns - self._key_ns
         most = FIRST_REPEAT_NS if self._times == 1 else REPEAT_NS
         if key != self._key or not self._times or apart > most:

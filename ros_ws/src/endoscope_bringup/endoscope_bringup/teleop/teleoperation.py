@@ -1,4 +1,4 @@
-"""The slave moved by the keyboard: keys in, handle and clutch out, and what goes on in words."""
+"""The slave moved by the keyboard: keys in, handle, clutch and messages out."""
 
 import argparse
 import math
@@ -83,12 +83,12 @@ def _check_consent(source: str, taken: bool) -> None:
 
 
 def _wait_for_the_handles_place(client: GraphClient) -> None:
-    """Raise GraphError where somebody else speaks for the handle and does not go."""
+    """Raise GraphError if another node keeps publishing the handle topics."""
     if not client.wait_until(lambda: not handle_senders(client.node), _GONE_S):
         others = ' and '.join(handle_senders(client.node))
         raise GraphError(
-            f'{others} speaks for the handle already, on {MASTER_MEASURED} or {MASTER_CLUTCH}; two '
-            'of them would be a fault'
+            f'the handle topics are already published by {others} ({MASTER_MEASURED} or '
+            f'{MASTER_CLUTCH}); a second publisher would be a fault'
         )
 
 
@@ -162,7 +162,7 @@ class _Teleoperation:
         # Orders that calibration had before the key for home was pressed; None while it is not.
         self._home: frozenset[int] | None = None
         self._quit = False
-        self._said: tuple[str, ...] = ()
+        self._shown: tuple[str, ...] = ()
 
     def run(self) -> int:
         """Take turns until the operator quits, a signal comes or the terminal is lost."""
@@ -259,14 +259,14 @@ class _Teleoperation:
         follows = turn.clutch and wanted is not None and obeyed
         lamp = 'HOME' if turn.homing else 'FOLLOW' if follows else 'HELD' if turn.clutch else 'OPEN'
         speed = f'{math.degrees(self._hand.speed):.0f} deg/s x {self._scale:.2g}'
-        said = self._client.state, lamp, speed, printable(self._why(turn, follows))
-        if said == self._said:
+        shown = self._client.state, lamp, speed, printable(self._why(turn, follows))
+        if shown == self._shown:
             return
-        self._said = said
+        self._shown = shown
         joints = '  '.join(
             f'{name} {_degrees(wanted, k)}/{_degrees(measured, k)}' for k, name in enumerate(JOINTS)
         )
-        self._terminal.say(f'{said[0]:<8} {lamp:<6} {joints} deg  {speed}  {said[3]}'.rstrip())
+        self._terminal.say(f'{shown[0]:<8} {lamp:<6} {joints} deg  {speed}  {shown[3]}'.rstrip())
 
     def _why(self, turn: Turn, follows: bool) -> str:
         """Why it does not move, in few words."""
@@ -275,8 +275,8 @@ class _Teleoperation:
             if at_limit:
                 return f'{" and ".join(at_limit)} at its limit'
             master = self._client.health.get(MASTER)
-            said = master.message if master is not None else 'silent'
-            return '' if follows else f'the master does not follow: {said}'
+            reason = master.message if master is not None else 'silent'
+            return '' if follows else f'the master does not follow: {reason}'
         return self._hindrance(time.time_ns()) or self._hand.dead_man.reason
 
 

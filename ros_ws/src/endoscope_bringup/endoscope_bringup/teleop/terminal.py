@@ -1,7 +1,7 @@
 """A terminal whose keys are read one by one, and which is put back as it was found.
 
 It sends a key's character or sequence when the key is pressed and again at each repeat (ECMA-48,
-xterm control sequences), and nothing when it is let go of.
+xterm control sequences), and nothing when it is released.
 """
 
 import codecs
@@ -115,7 +115,7 @@ class Terminal(ClosedOnExit):
         return keys
 
     def say(self, text: str) -> None:
-        """Write a line; a stuck or lost terminal must not hold up whoever has the clutch."""
+        """Write a line; a stuck or lost terminal must not block the release of the clutch."""
         with contextlib.suppress(OSError):
             if select.select([], [self._out], [], 0.0)[1]:
                 os.write(self._out, f'{text}\n'.encode())

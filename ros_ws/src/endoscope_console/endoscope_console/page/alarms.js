@@ -5,7 +5,7 @@ export const SILENT_STATE_S = 3.5;
 const ORDER = { high: 0, medium: 1, low: 2 };
 export const SIGN = { high: 'Danger', medium: 'Warning', low: 'Note' };
 
-/** Without a state for so long, in s, what was said last does not count: it comes once a second. */
+/** Age in s from which the last state is out of date: it comes once a second. */
 export const SILENT_CONSOLE_S = 2;
 /** Age of the picture in s: of its newest sample when it was sent, and since it came. */
 export const pictureAge = (picture, now) => (Number.isFinite(picture?.age) ? picture.age + (now - picture.arrived) : Infinity);
@@ -17,13 +17,13 @@ export const pictureAge = (picture, now) => (Number.isFinite(picture?.age) ? pic
  *   `lost`: who took them from it just now
  */
 export function standing(server, own) {
-  // Whose hand was let go of, needs to be told only to him.
+  // The release of a grip concerns its operator alone.
   const alarms = (server ?? []).filter(({ id }) => id !== 'dead_man' || own.mine);
   const add = (id, level, text) => {
     if (!alarms.some((alarm) => alarm.id === id)) alarms.push({ id, level, text, latched: false });
   };
   if (own.everConnected && !own.connected) {
-    // What was heard before says nothing of now.
+    // What was received before is out of date.
     alarms.length = 0;
     add('connection', 'medium', 'No connection to the console: nothing shown here is current. Reconnecting …');
   } else if (own.connected && own.pictureAge > BLIND_S && !alarms.some(({ id }) => id === 'graph')) {

@@ -6,7 +6,7 @@
 import { isMotionKey } from './hands.js';
 
 const PERIOD_MS = 20;
-/** A drag is told at most this often, so that no mouse is fast enough to be taken for a flood. */
+/** A drag is sent at most this often, so that no mouse is fast enough to be taken for a flood. */
 const MOVE_MS = 10;
 /** After the page has come to the front, no key that goes down is taken for a press. */
 const SETTLED_MS = 500;
@@ -96,7 +96,7 @@ export class DeadMan {
 
   _keys() {
     window.addEventListener('keydown', (event) => {
-      // On a Mac the release of another key is not told while this one is down.
+      // On a Mac the release of another key is not reported while this one is down.
       if (event.metaKey) this.letGo('the Command key is down');
       if (keysAreTaken() || event.ctrlKey || event.metaKey || event.altKey) return;
       if (!this._page.mine() || !this._page.shown()) return;
@@ -124,7 +124,7 @@ export class DeadMan {
     });
     element.addEventListener('pointermove', (event) => {
       if (!hands.pointerMove(name, event.pointerId, event.clientX, event.clientY)) return;
-      // Another button pressed or let go of on the way comes as a move.
+      // Another button pressed or released on the way comes as a move.
       if (event.pointerType === 'mouse' && !(event.buttons & 1)) {
         if (hands.pointerUp(name, event.pointerId)) this.send();
       } else if (performance.now() - this._sent >= MOVE_MS) this.send();

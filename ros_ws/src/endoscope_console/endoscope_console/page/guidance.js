@@ -1,8 +1,8 @@
-/** What to press next, in words: from what the server says and what the hands do. */
+/** Instructions for the next step, from the server's state and the hands. */
 
 import { SILENT_STATE_S } from './alarms.js';
 
-/** Reasons of the dead-man in words; what is not listed is said as it comes. */
+/** Reasons of the dead-man in words; what is not listed is shown as received. */
 const REASONS = {
   released: 'let go', silent: 'no sign of the hand for 0.1 s', late: 'frames came late', order: 'frames out of order',
   malformed: 'a malformed frame', flood: 'too many frames', hidden: 'this page was hidden',
@@ -35,13 +35,13 @@ export function lamp(state) {
   return 'OPEN';
 }
 
-/** Whether the last calibration ended without a class because none of them fits the tube. */
+/** Whether the last calibration found the tube outside all known classes. */
 export const isOfNoClass = (state) => Boolean(state?.calibration?.result?.none);
 
 /** Whether a calibration has found the class of the tube. */
 export const isCalibrated = (state) => Number.isFinite(state?.calibration?.result?.class_deg);
 
-/** Whether what the supervisor said last still counts. */
+/** Whether the last state of the supervisor is up to date. */
 export const stateIsFresh = (state, stateAge) =>
   Boolean(state?.operating_state) && !state.graph_ended && stateAge <= SILENT_STATE_S;
 
@@ -50,10 +50,10 @@ export const stateIsFresh = (state, stateAge) =>
  * 0 cannot, 1 take the controls, 2 enable, 3 calibrate (or move uncompensated), 4 let go first, 5 hold and move.
  */
 export function nextStep({ connected, current, role, mine, state, stateAge, rests, busy, half, held, touch, home, why }) {
-  if (!connected) return { step: 0, text: `Connecting to the console …${why ? ` It said: ${why}.` : ''}` };
+  if (!connected) return { step: 0, text: `Connecting to the console …${why ? ` Its reason: ${why}.` : ''}` };
   if (!state) return { step: 0, text: 'Waiting for the graph …' };
-  if (!current) return { step: 0, text: 'Nothing is heard of the console. Let go: what is shown is not current.' };
-  if (state.graph_ended) return { step: 0, text: 'Nothing moves: the graph has ended. Start endoscope console anew in its terminal.' };
+  if (!current) return { step: 0, text: 'No message from the console. Let go: what is shown is not current.' };
+  if (state.graph_ended) return { step: 0, text: 'Nothing moves: the graph has ended. Restart endoscope console in its terminal.' };
   if (role !== 'operator') return { step: 0, text: 'You are looking on. To operate, open the operator’s address.' };
   const { lease, calibration, playing, dead_man: deadMan } = state;
   if (!mine && lease?.holder) return { step: 1, text: `${nameOf(lease.holder, state)} has the controls. Watch, or take over.` };
@@ -61,7 +61,7 @@ export function nextStep({ connected, current, role, mine, state, stateAge, rest
     return { step: 1, text: 'Enabled, and nobody operates: take the controls, or press PAUSE or Disable.' };
   }
   if (!mine) return { step: 1, text: 'Take the controls. Nothing moves yet.' };
-  if (!stateIsFresh(state, stateAge)) return { step: 0, text: 'The supervisor is silent. Nothing moves until it speaks.' };
+  if (!stateIsFresh(state, stateAge)) return { step: 0, text: 'The supervisor is silent. Nothing moves until it is back.' };
   if (calibration?.running) return { step: 0, text: 'Calibrating: the instrument moves by itself. Esc pauses it.' };
   if (state.operating_state === 'FAULT') {
     const causes = state.causes ?? [];
@@ -93,6 +93,6 @@ export function nextStep({ connected, current, role, mine, state, stateAge, rest
     return { step: 5, text: `${touch ? 'Hold the left area, and drag on the pad.' : 'Hold Space and press an arrow key, or drag on the pad.'}${homing}` };
   }
   const missing = deadMan?.missing || deadMan?.reason || '';
-  if (held || busy || missing === 'hands on') return { step: 4, text: 'Let go of everything first, then take hold anew.' };
+  if (held || busy || missing === 'hands on') return { step: 4, text: 'Let go of everything first, then hold again.' };
   return { step: 4, text: endedForHim(missing) ? `Not ready: ${inWords(missing)}.` : 'Getting ready …' };
 }

@@ -2,8 +2,8 @@
  * What the operator's hands do, as input frames: no browser in here, and time is passed in.
  *
  * One device holds at a time. A grip begins where a device is taken hold of while none is held, and has
- * a number above all before it; it ends when that device is let go of, or when anything makes `letGo`
- * necessary. What is still pressed then has to be let go of and pressed again.
+ * a number above all before it; it ends when that device is released, or when anything makes `letGo`
+ * necessary. What is still pressed then has to be released and pressed again.
  */
 
 import { SOURCE } from './frames.js';
@@ -50,8 +50,8 @@ export class Hands {
     this._buttons = new Set();
   }
 
-  /** Take the greatest grip that the server has heard of. */
-  told(grips) {
+  /** Continue after the greatest number of a grip that the server knows. */
+  countFrom(grips) {
     this.grips = Math.max(this.grips, grips);
   }
 
@@ -62,7 +62,7 @@ export class Hands {
     return this._end(reason);
   }
 
-  /** A key went down; return whether that is news for the server. */
+  /** A key went down; return whether the server must be notified. */
   keyDown(code, repeat) {
     const known = isMotionKey(code) || code.startsWith('Shift');
     if (repeat || !known || this._keys.has(code)) return false;
@@ -152,7 +152,7 @@ export class Hands {
     return !this.held && Boolean((pad && !pad.mouse) !== (thumb && !thumb.mouse));
   }
 
-  /** Whether anything is pressed or deflected that has to be let go of first. */
+  /** Whether anything is pressed or deflected that has to be released first. */
   get busy() {
     const { x, y } = this.motion;
     return this.held || ['keyboard', 'pad', 'gamepad'].some((d) => this._holds(d)) || Math.hypot(x, y) >= 0.1;

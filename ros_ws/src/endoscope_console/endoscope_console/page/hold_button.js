@@ -4,7 +4,7 @@ import { toggle } from './elements.js';
 
 const HELD_S = 1;
 const TICK_MS = 20;
-/** A page that stood still has not seen whether the button was let go of: more than this does not count. */
+/** A page that stood still has not seen whether the button was released: more than this does not count. */
 const LONGEST_TICK_S = 0.05;
 
 export class HoldButton {

@@ -15,7 +15,7 @@ import { Orders, Socket } from './sockets.js';
 import { View3d } from './view3d.js';
 
 const TOKEN = 'endoscope token';
-/** A state that was on its way when the controls were taken does not tell of it yet. */
+/** A state that was under way when the controls were taken does not show it yet. */
 const CLAIM_SETTLES_MS = 500;
 const WORDS_MS = 150;
 const LOOPS_EVERY = 3;
@@ -117,7 +117,7 @@ command.addEventListener('hello', ({ detail }) => {
   app.you = detail.you;
   app.role = detail.role;
   app.modes = detail.modes ?? [];
-  app.hands.told(detail.grips ?? 0);
+  app.hands.countFrom(detail.grips ?? 0);
   connection();
 });
 command.addEventListener('closed', ({ detail }) => {
@@ -164,8 +164,8 @@ telemetry.addEventListener('message', ({ detail }) => {
   if (app.mine && settled && detail.lease?.holder !== app.you) {
     app.lost('The controls are lost.');
   }
-  // Once the server tells of another grip, what ended the last one here is an old story. Of that one
-  // it may still tell: what it said before it heard of its end is under way.
+  // Once the server reports another grip, the end of the last one here is out of date. It may still
+  // report that one: states that it sent before its end are under way.
   const { state, grips } = detail.dead_man;
   if (state === 'ENGAGED' && (detail.lease.holder !== app.you || grips > app.endedGrip)) app.endedHere = '';
   render();
@@ -234,7 +234,7 @@ function readings(tensions) {
 
 const TABS = ['operate', 'plots', 'see', 'explain'];
 
-/** Bring one of the pages to the front; what is held is let go of, since the section is out of sight. */
+/** Bring one of the pages to the front; the grip is released, since the section is out of sight. */
 function show(tab) {
   if (app.tab === tab) return;
   app.tab = tab;

@@ -1,4 +1,4 @@
-/** The page on which one operates: orders, what became of them, and what the instrument says of itself. */
+/** The page for operating: orders, their answers, and the state of the instrument. */
 
 import { SIGN, standing } from './alarms.js';
 import { keysAreTaken } from './dead_man.js';
@@ -13,8 +13,8 @@ const LOST_S = 10;
 const CALIBRATE = 3;
 const ANSWER_S = 8;
 const SLIDING_MS = 1000;
-/** Within so long the state tells of a scale that was asked for. */
-const SCALE_TOLD_MS = 1500;
+/** Time within which the state shows a requested scale. */
+const SCALE_SETTLES_MS = 1500;
 /** A protective stop is not unlocked by the hand that is still pressing. */
 const FAULT_REST_S = 2;
 
@@ -46,7 +46,7 @@ export class Operate {
     this._keys();
   }
 
-  /** Pause at once: what is held is let go of, and the server is told, whoever has the controls. */
+  /** Pause at once: end the grip and send the order, whoever has the controls. */
   pause() {
     const { app } = this;
     app.deadMan.letGo('paused');
@@ -72,7 +72,7 @@ export class Operate {
     else this.say('Let go first: the mode changes only while nothing is held.');
   }
 
-  /** Tell in the line for answers. */
+  /** Show a text in the line for answers. */
   say(text) {
     write($('answer'), text);
     this._answered = performance.now();
@@ -151,8 +151,8 @@ export class Operate {
       connected: app.connected, everConnected: app.everConnected, pictureAge: app.pictureAge(),
       gamepadLost: app.deadMan?.gamepadLost, mine: app.mine, lost: performance.now() - app.lostAt < 1000 * LOST_S ? app.whyLost : '',
     });
-    const room = Math.max(1, Math.floor(window.innerWidth / ALARM_PX));
-    const shown = app.tab === 'see' ? alarms : alarms.slice(0, room);
+    const fitting = Math.max(1, Math.floor(window.innerWidth / ALARM_PX));
+    const shown = app.tab === 'see' ? alarms : alarms.slice(0, fitting);
     if (alarms.length > shown.length) {
       shown.push({ id: ' more', level: 'low', text: `+${alarms.length - shown.length}: tab See` });
     }
@@ -292,7 +292,7 @@ export class Operate {
       this.say(`${from} has lost the controls meanwhile: ask again.`);
       return;
     }
-    // Frames have to come from the start: who is silent for 2 s loses the controls, before he is told that he has them.
+    // Frames have to come from the start: a page that is silent for 2 s loses the controls, before it knows that it has them.
     app.claiming = true;
     this.render();
     const answer = await this._order({ op: 'claim', take: Boolean(from) }, 'Take the controls');
@@ -321,7 +321,7 @@ export class Operate {
       return;
     }
     // What was asked for just now is not in the state yet.
-    const fresh = performance.now() - this._scaleAskedAt < SCALE_TOLD_MS;
+    const fresh = performance.now() - this._scaleAskedAt < SCALE_SETTLES_MS;
     const now = fresh ? this._scaleAsked : this.app.state?.console?.scale;
     if (!Number.isFinite(now)) return;
     this._scaleAsked = SCALES[Math.max(0, Math.min(SCALES.length - 1, nearestScale(now) + step))];
@@ -370,7 +370,7 @@ export class Operate {
     if (this.app.hands.modes.pad !== mode) this.toggleMode('pad');
   }
 
-  /** What is held is let go of first: the view is covered. */
+  /** The grip is released first: the view is covered. */
   _help() {
     this.app.deadMan.letGo('the help is open');
     $('help').showModal();

@@ -25,7 +25,7 @@ const around = (steps) => (_, low, high) => {
 };
 const upwards = (steps) => (_, low, high) => [0, holding(steps, 0, high)];
 
-/** Indices of what is plotted among the signals that hello told. */
+/** Indices of the plotted signals among those of hello. */
 export function places(signals) {
   const at = (topic) => signals.flatMap(({ name }, k) => (name.startsWith(`${topic}:`) ? [k] : []));
   return { wanted: at('slave/servo_jp'), actual: at('slave/measured_js'), tensions: at('wires/measured_js') };
@@ -37,7 +37,7 @@ export const scalesOf = (signals) => signals.map(({ unit }) => (unit === 'rad' ?
 export class Plots {
   /**
    * @param boxes elements for bend_x, bend_y, error and tensions, each with a `.plot` and `[data-value]` in its head
-   * @param signals as told by hello
+   * @param signals as listed in hello
    */
   constructor(boxes, signals) {
     const style = getComputedStyle(document.documentElement);
@@ -45,7 +45,7 @@ export class Plots {
     this._places = places(signals);
     this._boxes = boxes;
     this._turn = true;
-    // In grey, or to who sees few colours, dashes tell them apart.
+    // In grey, or with colour blindness, they are distinguished by their dashes.
     const wires = [['wire-x-pos', []], ['wire-x-neg', [7, 4]], ['wire-y-pos', [2, 3]], ['wire-y-neg', [9, 3, 2, 3]]];
     // What is wanted lies on top: where both agree, its dashes still show.
     const pair = [['actual', [], true], ['wanted', [6, 4], true]];
@@ -106,7 +106,7 @@ export class Plots {
     });
   }
 
-  /** One plot: `curves` of [colour, dash, whether it comes as min, max, last], their unit, and whether time is told. */
+  /** One plot: `curves` of [colour, dash, whether it comes as min, max, last], their unit, and whether the time axis is labelled. */
   _plot(box, curves, range, unit, labelled) {
     const target = box.querySelector('.plot');
     const [line, quiet] = [this._colour('line'), this._colour('quiet')];

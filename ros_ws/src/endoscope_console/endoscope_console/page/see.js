@@ -1,4 +1,4 @@
-/** What every part says of itself: health, counters, states and who is there. */
+/** Health of all nodes, counters, states and connected operators. */
 
 import { $, each, make, set, write } from './elements.js';
 

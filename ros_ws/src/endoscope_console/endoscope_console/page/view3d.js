@@ -6,7 +6,7 @@ const WANTED = 0.0024;
 const GROUND = -0.005;
 /** Height in px at the foot of the picture that is kept for words. */
 const FOOT = 88;
-/** How far from the wires their tensions are told at least. */
+/** Smallest distance of the tensions' labels from the wires. */
 const LABEL_PX = 78;
 const RINGS_MM = [5, 10, 15];
 const HOME = { azimuth: -0.42, elevation: 0.5, zoom: 1 };

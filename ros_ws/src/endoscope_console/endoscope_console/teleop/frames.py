@@ -20,7 +20,7 @@ _HEAD = struct.Struct('<BBHIdd')
 _FLAGS = 1, 2, 4, 8, 16
 """Of the first five fields of an input frame."""
 _KNOWN_FLAGS = sum(_FLAGS)
-# 300 years: more is no time, and no number of ns that a float tells apart.
+# 300 years: more is no valid time, and a float does not resolve such a number of ns.
 _LAST_S = 1e10
 _F32 = np.dtype('<f4')
 
@@ -30,7 +30,7 @@ class MalformedFrameError(EndoscopeError, ValueError):
 
 
 class Source(IntEnum):
-    """By what a hand speaks."""
+    """Input device of a frame."""
 
     KEYBOARD = 0
     POINTER = 1

@@ -10,7 +10,7 @@ UNATTENDED_NS = 5_000_000_000
 
 @dataclass(frozen=True)
 class Claim:
-    """What became of a claim."""
+    """Outcome of a claim."""
 
     granted: bool  # whether the client holds the lease now
     why: str = ''  # why not

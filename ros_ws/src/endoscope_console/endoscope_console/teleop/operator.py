@@ -14,9 +14,9 @@ SILENCE_NS = 100_000_000
 LATE_NS = 100_000_000
 """A frame that took so much longer than the quickest is not obeyed."""
 BLIND_NS = 300_000_000
-"""Who was drawn no newer picture is blind."""
+"""Age of the last drawn picture from which the operator counts as blind."""
 STATE_NS = 3_500_000_000
-"""Without a word of the supervisor for so long its state is unknown; motors hold long before."""
+"""Silence of the supervisor after which its state is unknown; motors hold long before."""
 
 # What a hand that rests on a stick may leave.
 _REST = 0.1
@@ -25,7 +25,7 @@ _DRIFT = 1000
 
 
 class DeadManState(StrEnum):
-    """Where the dead-man is."""
+    """State of the dead-man."""
 
     OPEN = 'OPEN'
     READY = 'READY'
@@ -195,8 +195,8 @@ class OperatorDeadMan:
             if not self.engaged:
                 self._engage(conditions)
         elif self.engaged:
-            said = self._dead_man.reason
-            self._open(_OF_THE_RULE.get(said) or Reason(said))
+            reason = self._dead_man.reason
+            self._open(_OF_THE_RULE.get(reason) or Reason(reason))
         elif hindrance or self.frame is None or self.frame.pressed:
             self._open(hindrance or Reason.HANDS_ON)
 

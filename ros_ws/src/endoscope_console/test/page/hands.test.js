@@ -22,7 +22,7 @@ test('Space holds, arrows bend, and a release ends it', () => {
   hands.keyUp('Space');
   const after = frame(hands);
   assert.equal(after.pressed, false);
-  assert.equal(after.y, 1, 'an arrow that is still down is told, so that the server waits for it');
+  assert.equal(after.y, 1, 'an arrow that is still down is reported, so that the server waits for it');
   assert.equal(hands.busy, true);
   assert.equal(hands.reason, 'let go');
 });
@@ -51,13 +51,13 @@ test('repeats of a key are no presses', () => {
   assert.equal(hands.held, true);
 });
 
-test('grips count on above those that the server told', () => {
+test('grips are numbered above those of the server', () => {
   const hands = new Hands();
-  hands.told(41);
+  hands.countFrom(41);
   hands.keyDown('Space', false);
   assert.equal(frame(hands).grip, 42);
   hands.keyUp('Space');
-  hands.told(3);
+  hands.countFrom(3);
   hands.keyDown('Space', false);
   assert.equal(frame(hands).grip, 43);
 });

@@ -12,26 +12,26 @@ import { Camera, frames, points, tensionColour } from '../page/view3d.js';
 const WELL = { connected: true, everConnected: true, pictureAge: 0.02, gamepadLost: false };
 
 test('alarms stand most urgent first', () => {
-  const said = [{ id: 'a', level: 'low' }, { id: 'b', level: 'high' }, { id: 'c', level: 'medium' }];
-  assert.deepEqual(standing(said, WELL).map((alarm) => alarm.id), ['b', 'c', 'a']);
+  const given = [{ id: 'a', level: 'low' }, { id: 'b', level: 'high' }, { id: 'c', level: 'medium' }];
+  assert.deepEqual(standing(given, WELL).map((alarm) => alarm.id), ['b', 'c', 'a']);
 });
 
-test('the page itself knows that the picture is old, and tells it once', () => {
+test('the page itself knows that the picture is old, and shows it once', () => {
   assert.deepEqual(standing([], { ...WELL, pictureAge: 0.29 }), []);
   assert.deepEqual(standing([], { ...WELL, pictureAge: 0.31 }).map((a) => [a.id, a.level]), [['picture', 'medium']]);
   assert.equal(standing([{ id: 'picture', level: 'medium' }], { ...WELL, pictureAge: 0.31 }).length, 1);
 });
 
-test('without a connection only that is said', () => {
-  const said = [{ id: 'fault', level: 'high' }];
-  assert.deepEqual(standing(said, { ...WELL, connected: false }).map((a) => a.id), ['connection']);
+test('without a connection only that is shown', () => {
+  const given = [{ id: 'fault', level: 'high' }];
+  assert.deepEqual(standing(given, { ...WELL, connected: false }).map((a) => a.id), ['connection']);
   assert.deepEqual(standing([], { ...WELL, connected: false, everConnected: false }), []);
 });
 
-test('who looks on is not told of the hand of another, and an ended graph of nothing else', () => {
-  const said = [{ id: 'dead_man', level: 'medium' }];
-  assert.deepEqual(standing(said, WELL), []);
-  assert.deepEqual(standing(said, { ...WELL, mine: true }).map((a) => a.id), ['dead_man']);
+test('a viewer does not see the grip of another, and of an ended graph nothing else is shown', () => {
+  const given = [{ id: 'dead_man', level: 'medium' }];
+  assert.deepEqual(standing(given, WELL), []);
+  assert.deepEqual(standing(given, { ...WELL, mine: true }).map((a) => a.id), ['dead_man']);
   assert.deepEqual(standing([], { ...WELL, lost: 'c2 took the controls' }).map((a) => a.text), ['c2 took the controls']);
   assert.deepEqual(standing([{ id: 'graph', level: 'high' }], { ...WELL, pictureAge: 9 }).map((a) => a.id), ['graph']);
 });
@@ -70,8 +70,8 @@ test('a stranger is led to the first motion step by step', () => {
     [{}, state({ dead_man: { state: 'ENGAGED' } }), 5, 'Following'],
     [{}, state({ dead_man: { state: 'READY' }, playing: { what: 'file' }, console: { source: 'file' } }), 5, 'the experiment plays'],
   ];
-  for (const [more, said, step, words] of steps) {
-    const next = nextStep({ ...base, ...more, state: said });
+  for (const [more, given, step, words] of steps) {
+    const next = nextStep({ ...base, ...more, state: given });
     assert.equal(next.step, step, next.text);
     assert.ok(next.text.includes(words), next.text);
   }
@@ -83,7 +83,7 @@ test('nothing is promised where nothing can move', () => {
     [{}, state({ graph_ended: true })], [{ rests: true }, state({ operating_state: 'FAULT' })],
     [{}, state({ calibration: { running: true } })], [{}, state({ operating_state: 'FAULT', causes: ['no tracker'] })],
   ];
-  for (const [more, said] of cannot) assert.equal(nextStep({ ...base, ...more, state: said }).step, 0);
+  for (const [more, given] of cannot) assert.equal(nextStep({ ...base, ...more, state: given }).step, 0);
   assert.equal(nextStep({ ...base, state: state({ operating_state: 'FAULT' }) }).step, 2);
 });
 
@@ -148,7 +148,7 @@ test('differences are of what is known of both', () => {
   assert.deepEqual(history.difference(0, 1), [2, null]);
 });
 
-test('a loop grows while the wanted angle moves, and tells its error', () => {
+test('a loop grows while the wanted angle moves, and shows its error', () => {
   const loop = new Loop(50);
   for (let k = 0; k < 200; k++) loop.take(k, k - 3);
   assert.equal(loop.wanted.length, 50);
@@ -170,7 +170,7 @@ test('an axis has ticks at both ends, however low it is', () => {
   assert.deepEqual(ticks(0, 20, 130), [0, 5, 10, 15, 20]);
 });
 
-test('signals are found by the names that hello tells', () => {
+test('signals are found by the names in hello', () => {
   const signals = ['slave/servo_jp:bend_x', 'slave/measured_js:bend_x', 'slave/servo_jp:bend_y', 'wires/measured_js:wire_x_pos']
     .map((name) => ({ name, unit: name.startsWith('wires') ? 'N' : 'rad' }));
   assert.deepEqual(places(signals), { wanted: [0, 2], actual: [1], tensions: [3] });

@@ -1,4 +1,4 @@
-"""Watches whether a rig that works is still the one that its plant describes."""
+"""Change detection: whether a rig still matches its plant while it moves, and if not, where."""
 
 from endoscope_core.monitoring.rig_change import Part
 from endoscope_core.monitoring.rig_watch import Alarm, RigWatch

@@ -1,6 +1,6 @@
-"""Gains of the likelihood's logarithm at which a change of each part is reported.
+"""Log-likelihood gains at which a change of each part is reported.
 
-From 10 h of motion of rigs that stay as they are, by
+From 10 h of motion of unchanged rigs, by
 `endoscope bench watch --derive --nominal 2101-2160`.
 """
 

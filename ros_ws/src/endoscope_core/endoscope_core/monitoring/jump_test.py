@@ -3,12 +3,12 @@
 The difference is a vector b of numbers, one a direction; a residual follows S b + noise, S the
 derivatives along the motion. b walks at random, slowly, and is estimated by the Kalman filter. The
 last seconds do not enter the estimate, but are judged by it: for each moment since when b may have
-jumped and for each change, the generalised likelihood ratio says how much likelier it is with the
+jumped and for each change, the generalised likelihood ratio compares the data with and without the
 jump (Willsky, Jones, IEEE Trans. Autom. Control 21(1), 1976). The largest one over all moments is
 Page's cumulative sum (Biometrika 41, 1954) for a change of unknown size, over windows of limited
 length (Lai, J. R. Stat. Soc. B 57(4), 1995): see Basseville, Nikiforov, Detection of Abrupt
-Changes, 1993, ch. 2 and 7. Noise is of unknown size near the one learnt (Student's t), so that a
-motion which the description predicts badly is not taken for a change.
+Changes, 1993, ch. 2 and 7. The size of the noise is uncertain around the learnt one (Student's t),
+so that a motion which the description predicts badly is not taken for a change.
 """
 
 import math
@@ -75,7 +75,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Jumps:
-    """What W windows and K changes say at one moment."""
+    """Result of W windows and K changes at one time."""
 
     gain: Array  # (W, K), of the likelihood's logarithm by a jump where a window begins
     size: Array  # (W, K), its likeliest size, in steps
@@ -88,7 +88,7 @@ class JumpTest:
         self,
         tolerance: Array,  # (D,), rms of each number of a healthy rig
         drift: Array,  # (D,), rms of its change in a block
-        along: Array,  # (K, D), directions of the changes that are told
+        along: Array,  # (K, D), directions of the changes to detect
         one_way: NDArray[np.bool_],  # (K,), whether only a positive jump is one
         least: Array,  # (K,), smallest size of a jump
         noise: Array,  # (C,), first guess of the rms of a bin's residual
@@ -182,5 +182,5 @@ class JumpTest:
         loss = 0.5 * (n + USUAL) * np.log((left + USUAL) / (n + USUAL))
         likelihood = -loss.sum(axis=1) - unlikely
         gain = likelihood[:, 1:] - likelihood[:, :1]
-        told = np.where(self._one_way, size, np.abs(size)) >= self._least
-        return Jumps(np.where(told, np.maximum(gain, 0.0), 0.0), size)
+        reported = np.where(self._one_way, size, np.abs(size)) >= self._least
+        return Jumps(np.where(reported, np.maximum(gain, 0.0), 0.0), size)

@@ -1,8 +1,8 @@
-"""What a described rig would read, and each of its possible changes, along the motion it makes.
+"""Predicted readings of a described rig, and of each possible change, along its measured motion.
 
 The motor is predicted from what it is sent to; wires and joint from where the motor was measured,
 so that a slow servo is not taken for a tight tube. Behind the motor hardly anything depends on the
-rate, so that ticks of 5 ms do; the state goes on from block to block.
+rate, so that ticks of 5 ms suffice; the state continues from block to block.
 """
 
 from collections.abc import Sequence
@@ -109,7 +109,7 @@ class PredictionBank:
             copies.rest(float(shaft[j]))
             for k, (slip, wires) in enumerate(zip(SLIPS, SLIPPED, strict=True)):
                 for wire in wires:
-                    # What is wound up more than the pulley has turned is let go in the first tick.
+                    # What is wound up beyond the turn of the pulley is released in the first tick.
                     copies.states[k, layout.TRAVEL + wire] += slip.step
             self._servos[j].rest(float(shaft[j]))
 

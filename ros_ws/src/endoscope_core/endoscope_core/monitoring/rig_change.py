@@ -1,8 +1,8 @@
-"""What may become different while a rig works, and by how much a healthy rig is off.
+"""Changes of a rig that are detected in operation, and tolerances of a healthy rig.
 
 Each direction is one number of a joint: the plant with that number changed predicts other readings,
-and the difference is what the change looks like. Directions that are no change to be told, as the
-stiffness of the wires, are only estimated, so that a description that is a little wrong is not
+and the difference is the signature of the change. Directions that are not reported as a change,
+such as the stiffness of the wires, are only estimated, so that a slightly wrong description is not
 taken for a change.
 """
 
@@ -22,13 +22,13 @@ from endoscope_core.physics.description import (
 HEALTHY = 0.1 / math.sqrt(3.0)
 """Rms of the relative difference of a scaled number from its description: within 10 %."""
 SMALLEST = 1.0 / 3.0
-"""Share of what is usual of a change below which none is told, however sure it is."""
+"""Share of a change's typical size below which it is not reported, however certain it is."""
 DRIFT_S = 100.0
 """Seconds of motion in which a number drifts by its `drift`."""
 
 
 class Part(StrEnum):
-    """Part of the rig that a change is told of."""
+    """Part of the rig in which a change is located."""
 
     CELL = 'cell'
     TRACKER = 'tracker'
@@ -104,7 +104,7 @@ READ = (
     Direction('effort', EFFORT_STEP, 1.0, 0.1),
 )
 """Of the sensors: follow from what they read."""
-# A wire of 3000 N/m that slips by 0.2 mm lets go of 0.6 N. A long slip is no multiple of it: the
+# A wire of 3000 N/m that slips by 0.2 mm loses 0.6 N. A long slip is no multiple of it: the
 # wire slackens for part of the motion.
 SLIPS = (
     Direction('slip_pos', _SLIP, 0.8, 0.15),
@@ -156,7 +156,7 @@ DIRECTIONS = (*READ, *SLIPS, *SIMULATED, *SERVO)
 
 @dataclass(frozen=True)
 class Change:
-    """A change that is told: along which directions, and what is usual of it."""
+    """A change that can be reported: its directions and its typical size."""
 
     name: str  # in words
     part: Part
@@ -185,4 +185,4 @@ CHANGES = (
     Change('backlash of the gear', Part.ACTUATOR, ('gear_backlash',), 1.0),
     Change('lag of the servo', Part.ACTUATOR, ('servo_lag',), 1.0),
 )
-"""All K that are told of a joint."""
+"""All K changes that are reported of a joint."""

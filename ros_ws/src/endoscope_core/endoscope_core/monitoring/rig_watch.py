@@ -1,4 +1,4 @@
-"""Watches whether a rig that moves is still the one described: samples in, an alarm out."""
+"""Change detection on a moving rig: takes samples, raises an alarm."""
 
 import math
 from collections import deque
@@ -26,40 +26,40 @@ _BINS = 5
 WINDOWS = np.array([1, 2, 3, 4, 6, 8, 11, 15, 20, 26, 33, 40])
 """Lengths in blocks of the time since a change, 10 s of motion at most."""
 LEARNT = 80
-"""Blocks of motion, 20 s, before which nothing is told."""
+"""Blocks of motion, 20 s, before the first report."""
 NAMED_AFTER = 16
-"""Blocks of motion, 4 s, from an alarm to its stage: what a change does at first is unlike it."""
+"""Blocks of motion, 4 s, from an alarm to its stage: the onset of a change is not typical of it."""
 TIE = 0.9
 """Share of the largest gain from which on another part is as likely."""
 STILL_RAD = 0.02
-"""Way of a shaft in a block below which the joint stands still."""
+"""Travel of a shaft in a block below which the joint is at rest."""
 SWEEPS, LEAST_RANGE_RAD = 3.0, 0.3
-"""Ways over the visited range, and that range in rad of the shaft, after which a joint has
-forgotten where it came from."""
+"""Travel over the visited range, and that range in rad of the shaft, after which the state of a
+joint no longer depends on where it started."""
 LONGEST_GAP_S = 0.1
-"""Of motors and setpoints; longer, and the wires may be anywhere."""
+"""Of motors and setpoints; after a longer gap the state of the wires is unknown."""
 LATE_S = 0.3
-"""How long a block's last samples may be on their way."""
+"""Largest latency of a block's last samples."""
 _NOISE = np.array([0.003, 0.05, 0.05, 0.001, 0.01])
 _PART_OF = np.array([str(change.part) for change in CHANGES])
 
 
 @dataclass(frozen=True)
 class Alarm:
-    """A change that was noticed.
+    """A change that was detected.
 
     Attributes
     ----------
     joint : str
         Where.
     at : float
-        When it was noticed, s.
+        When it was detected, s.
     since : float
-        From when on, by the likeliest window, s.
+        Onset, by the likeliest window, s.
     margin : float
-        Largest gain of the likelihood's logarithm, by its threshold.
+        Largest log-likelihood gain relative to its threshold.
     parts : tuple of Part
-        Likeliest first; the others are as likely. Empty until the change can be named.
+        Likeliest first; the rest are about as likely. Empty until the change is located.
     change : str
         The likeliest one in words.
     """
@@ -74,11 +74,11 @@ class Alarm:
     def __str__(self) -> str:
         where = ' or '.join(self.parts) or 'stage not known yet'
         what = f' ({self.change})' if self.change else ''
-        return f'{self.joint} is not as described any more: {where}{what}'
+        return f'{self.joint} no longer matches its plant: {where}{what}'
 
 
 class _Joint:
-    """One joint: what it has learnt, and what it has noticed."""
+    """Learnt state and alarm of one joint."""
 
     def __init__(self, name: str, thresholds: Mapping[str, float]) -> None:
         along = [[float(d.name in c.along) for d in DIRECTIONS] for c in CHANGES]
@@ -103,14 +103,14 @@ class _Joint:
         self.forget_motion()
 
     def forget_motion(self) -> None:
-        """Begin from an unknown past."""
+        """Restart with an unknown history."""
         self.test.interrupt()
         self._times.clear()
         self._way, self._low, self._high = 0.0, math.inf, -math.inf
         self.margin, self.jumps = 0.0, None
 
     def moves(self, shaft: Array) -> bool:
-        """Follow a shaft (N,) over a block; whether the joint moves and its past is forgotten."""
+        """Follow a shaft (N,) over a block; whether the joint moves and its start is forgotten."""
         way = float(np.abs(np.diff(shaft)).sum())
         self._way += way
         self._low, self._high = min(self._low, shaft.min()), max(self._high, shaft.max())
@@ -160,7 +160,7 @@ class _Joint:
 
 
 class RigWatch:
-    """Compares a rig with its description as it moves.
+    """Compares a rig with its description while it moves.
 
     Samples are added to `setpoint` (J columns, rad), `motor` (2 J: shaft angles in rad, then
     efforts in N m), `wires` (2 J: both tensions in N of each joint) and `tracker` (J, rad), in any
@@ -171,7 +171,7 @@ class RigWatch:
     plant : PlantDescription
         The rig as described, of J joints.
     thresholds : Mapping[str, float], optional
-        Gain of the likelihood's logarithm at which a change of each `Part` is told.
+        Log-likelihood gain at which a change of each `Part` is reported.
     """
 
     def __init__(
@@ -188,21 +188,21 @@ class RigWatch:
 
     @property
     def alarms(self) -> list[Alarm]:
-        """One of each joint that has changed."""
+        """One alarm of each joint that has changed."""
         return [joint.alarm for joint in self.joints if joint.alarm is not None]
 
     @property
     def margin(self) -> float:
-        """Largest gain of the moment, by its threshold."""
+        """Largest current gain relative to its threshold."""
         return max(joint.margin for joint in self.joints)
 
     @property
     def ready(self) -> bool:
-        """Whether every joint has moved long enough for a change to be told."""
+        """Whether every joint has moved long enough for a change to be reported."""
         return all(joint.test.learnt >= LEARNT for joint in self.joints)
 
     def gains(self) -> dict[str, float]:
-        """Largest gain of the moment of each part, of joints that have moved long enough."""
+        """Largest current gain of each part, of joints that have moved long enough."""
         judged = [x.jumps for x in self.joints if x.jumps is not None and x.test.learnt >= LEARNT]
         return {
             str(part): max((float(x.gain[:, part == _PART_OF].max()) for x in judged), default=0.0)

@@ -1,4 +1,4 @@
-"""Samples of the topics of a rig, and what they are on the ticks of a prediction."""
+"""Samples of the topics of a rig, and their values at the ticks of a prediction."""
 
 from dataclasses import dataclass, field
 
@@ -28,11 +28,11 @@ class Samples:
         self.values = np.concatenate([self.values, new])
 
     def clear(self) -> None:
-        """Leave out all."""
+        """Remove all samples."""
         self.time, self.values = self.time[:0], self.values[:0]
 
     def drop(self, before: float) -> None:
-        """Leave out all before the last one at or before a time."""
+        """Remove all samples before the last one at or before a time."""
         first = max(int(np.searchsorted(self.time, before + _SAME_S, 'right')) - 1, 0)
         self.time, self.values = self.time[first:], self.values[first:]
 
@@ -42,7 +42,7 @@ class Samples:
         return not (np.diff(self.time) < 0.0).any()
 
     def flaw(self, begin: float, end: float, longest: float) -> str:
-        """What forbids to follow the samples all through a time, in words, or nothing."""
+        """Why the samples do not cover an interval, in words; empty if they do."""
         inside = (self.time > begin - longest) & (self.time <= end + _SAME_S)
         times = self.time[inside]
         if not np.isfinite(self.values[inside]).all():
@@ -52,16 +52,16 @@ class Samples:
         return ''
 
     def held(self, time: Array) -> Array:
-        """Values in force at times (N,): the last ones before."""
+        """Values in force at times (N,): zero-order hold."""
         last = np.searchsorted(self.time, time + _SAME_S, 'right') - 1
         return self.values[np.maximum(last, 0)]
 
     def between(self, time: Array) -> Array:
-        """Values at times (N,), by lines between samples."""
+        """Values at times (N,), linearly interpolated."""
         return np.column_stack([np.interp(time, self.time, each) for each in self.values.T])
 
     def binned(self, begin: float, length: float, bins: int) -> 'Binned':
-        """What lies in consecutive bins of a length in s."""
+        """Samples in consecutive bins of a length in s."""
         since = self.time - begin
         place = np.ceil((since - _SAME_S) / length).astype(np.int64) - 1
         inside = (place >= 0) & (place < bins)
@@ -85,7 +85,7 @@ class Binned:
         return total / np.where(count > 0.0, count, np.nan)[:, None]
 
     def means_of(self, grid: Array) -> Array:
-        """Matrix (bins, G) from values on an even grid (G,) of times to what `means` would be."""
+        """Matrix (bins, G) that maps values on a regular grid (G,) of times to `means`."""
         at = np.clip((self.time - grid[0]) / (grid[1] - grid[0]), 0.0, len(grid) - 1.0)
         left = np.minimum(at.astype(np.int64), len(grid) - 2)
         matrix = np.zeros((self.bins, len(grid)))

@@ -1,4 +1,4 @@
-"""What stands on the table: gears, limits, time-outs and devices, said once for every node."""
+"""The rig: gears, limits, time-outs and devices, defined once for all nodes."""
 
 from endoscope_core.rig.facts import (
     DeviceFacts,

@@ -1,4 +1,4 @@
-"""rig.yaml: gear, limits, time-outs and devices of a rig, said once for every node."""
+"""rig.yaml: gear, limits, time-outs and devices of a rig, defined once for all nodes."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -21,7 +21,7 @@ NAME = Meta(
 
 @dataclass(frozen=True)
 class JointFacts:
-    """What is the same for every joint of the bending section; SI units."""
+    """Facts common to all joints of the bending section; SI units."""
 
     gear: Annotated[float, within(0.01, 100.0)]  # shaft angle for one radian at the joint
     # Largest desired bending in rad, either way, whoever desires it: played motion, handle, program
@@ -54,7 +54,7 @@ class JointFacts:
 
 @dataclass(frozen=True)
 class MotorFacts:
-    """What is the same for every motor shaft; SI units."""
+    """Facts common to all motor shafts; SI units."""
 
     reach: Annotated[float, within(0.01, 20.0)]  # largest shaft angle in rad, either way
     # Largest of a shaft, in rad/s and rad/s^2.
@@ -69,7 +69,7 @@ class MotorFacts:
 
 @dataclass(frozen=True)
 class Timeouts:
-    """How long something may be silent, in s."""
+    """Longest permitted silences, in s."""
 
     # A command older than this is not obeyed, and a stream that pauses longer has ended.
     command: Annotated[float, within(0.001, 1.0)]
@@ -120,7 +120,7 @@ class InstrumentFacts:
 
 @dataclass(frozen=True)
 class DeviceFacts:
-    """What stands on the table and what is simulated."""
+    """Which devices are real and which are simulated."""
 
     # One of `MOTOR_DEVICES`, `LOAD_CELL_DEVICES` and `TRACKER_DEVICES`.
     motors: Annotated[str, one_of(MOTOR_DEVICES)]
@@ -167,7 +167,7 @@ class Rig:
 
 
 def load_rig(path: str | Path | None = None) -> Rig:
-    """Read a rig.yaml; what it does not say is as in the shipped one, which is the default.
+    """Read a rig.yaml; missing keys take the values of the shipped one, which is the default.
 
     FileError if it cannot be read, has an unknown key, or a value out of range.
     """
@@ -186,7 +186,7 @@ def rig_as_text(rig: Rig) -> str:
 
 
 def rig_from_text(text: str, name: str) -> Rig:
-    """Read what `rig_as_text` wrote; `name` says where it stands, for messages.
+    """Read what `rig_as_text` wrote; `name` is its place in error messages.
 
     FileError if it has an unknown key, or a value out of range.
     """
@@ -204,12 +204,12 @@ def _rig(own: Any, where: str) -> Rig:
 
 
 def _over(shipped: Mapping[str, Any], own: Any) -> Any:
-    """What a file says, and where it says nothing what the shipped one does."""
+    """The values of a file, completed with those of the shipped one."""
     if not isinstance(own, Mapping):
         return own
-    said = {
+    parts = {
         key: _over(part, {} if own.get(key) is None else own[key])
         for key, part in shipped.items()
         if isinstance(part, Mapping)
     }
-    return {**shipped, **own, **said}
+    return {**shipped, **own, **parts}

@@ -1,4 +1,4 @@
-"""Whether a rig is real, made of emulated devices or simulated: what a recording says of itself."""
+"""Kind of a rig, as its recordings carry it: real, of emulated devices, or simulated."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -13,17 +13,17 @@ from endoscope_core.schema import parse_yaml
 
 
 class Kind(StrEnum):
-    """Kind of a rig, by what its motors are; the first of several in a recording holds for it."""
+    """Kind of a rig, by its motors; of several in a recording the first listed here counts."""
 
     SIMULATED = 'simulated'  # the plant of this project moves
     EMULATED = 'emulated'  # servos that this project emulates answer the driver
-    UNKNOWN = 'unknown'  # nobody said
+    UNKNOWN = 'unknown'  # not recorded
     REAL = 'real'
 
 
 @dataclass(frozen=True)
 class RigKind:
-    """What kind a rig is, and by what it can be known again; empty where nobody said it."""
+    """Kind and identification of a rig; empty where not recorded."""
 
     kind: Kind = Kind.UNKNOWN
     program: str = ''  # name and version of the program that drove or simulated it
@@ -33,8 +33,8 @@ class RigKind:
 
     def as_text(self) -> str:
         """Return it as YAML, as it stands on the topic; what is empty is left out."""
-        said = {name: str(value) for name, value in asdict(self).items() if value}
-        return yaml.safe_dump(said, sort_keys=False)
+        known = {name: str(value) for name, value in asdict(self).items() if value}
+        return yaml.safe_dump(known, sort_keys=False)
 
     def as_json(self) -> dict[str, str]:
         """Return it as plain data."""
@@ -48,8 +48,8 @@ class RigKind:
             if self.plant_sha256
             else '',
         ]
-        told = ', '.join(filter(None, known))
-        return f'{self.kind} ({told})' if told else str(self.kind)
+        details = ', '.join(filter(None, known))
+        return f'{self.kind} ({details})' if details else str(self.kind)
 
 
 def digest(text: str) -> str:
@@ -58,20 +58,20 @@ def digest(text: str) -> str:
 
 
 def kind_from_text(text: str) -> RigKind:
-    """Read what `RigKind.as_text` wrote; whatever else a recording has there is unknown."""
+    """Read what `RigKind.as_text` wrote; any other text is of an unknown kind."""
     try:
-        said = parse_yaml(text, 'kind of the rig')
+        document = parse_yaml(text, 'kind of the rig')
     except FileError:
-        # A recording of somebody else's: that its topic says something else makes it no real one.
+        # A foreign recording: other content of this topic does not make the rig a real one.
         return RigKind()
-    if not isinstance(said, Mapping) or said.get('kind') not in list(Kind):
+    if not isinstance(document, Mapping) or document.get('kind') not in list(Kind):
         return RigKind()
     words: dict[str, Any] = {
-        name: str(said.get(name, '')) for name in RigKind.__dataclass_fields__ if name != 'kind'
+        name: str(document.get(name, '')) for name in RigKind.__dataclass_fields__ if name != 'kind'
     }
-    return RigKind(Kind(said['kind']), **words)
+    return RigKind(Kind(document['kind']), **words)
 
 
-def kind_of_several(said: list[RigKind]) -> RigKind:
-    """Return the kind of a recording in which `said` was said: real only where all of it is."""
-    return min(said, key=lambda one: list(Kind).index(one.kind), default=RigKind())
+def kind_of_several(kinds: list[RigKind]) -> RigKind:
+    """Return the kind of a recording that carries several: real only if all of them are."""
+    return min(kinds, key=lambda one: list(Kind).index(one.kind), default=RigKind())

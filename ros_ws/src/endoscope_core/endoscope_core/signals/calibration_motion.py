@@ -17,11 +17,11 @@ CALIBRATION_AMPLITUDE = float(np.deg2rad(90.0))
 """Of the calibration sinusoid, rad."""
 CALIBRATION_FREQUENCY = 1.0
 CALIBRATION_RECORD_DURATION = 9.0
-"""How much of the calibration sinusoid is recorded, s."""
+"""Recorded length of the calibration sinusoid, s."""
 CALIBRATION_RATE = 1000.0
 """Rate at which it is recorded, Hz."""
 CALIBRATION_SAMPLES = 9000
-"""How many samples of it are recorded."""
+"""Number of recorded samples."""
 START_RAMP = 0.5
 RETURN_DURATION = 1.0
 BRIEF_FREQUENCY = 2.5
@@ -101,7 +101,7 @@ def brief_calibration() -> Signal:
 
 @dataclass(frozen=True)
 class CalibrationMotion:
-    """What a calibration commands, and how much of it is recorded."""
+    """Motion of a calibration, and the length of its record."""
 
     name: str
     signal: Signal  # of every joint; it ends at rest at zero, after the record
@@ -109,7 +109,7 @@ class CalibrationMotion:
 
     @property
     def settled(self) -> int:
-        """First sample of the last whole period, which has forgotten where the motion began."""
+        """First sample of the last whole period, which no longer depends on the start."""
         return math.ceil(self.signal.steady[0] * CALIBRATION_RATE)
 
     @property

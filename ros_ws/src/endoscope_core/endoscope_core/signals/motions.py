@@ -27,8 +27,8 @@ def sum_of_sines(name: str, components: Sequence[tuple[float, float]], duration:
     """Sum of sines, of amplitude (rad) and frequency (rad/s) each, begun and ended by ramps.
 
     `duration` in s includes both ramps. The `steady` interval leaves out the ramps and
-    the first quarter period of the slowest sine, after which the hysteresis no longer remembers how
-    the motion began; ValueError if that leaves none.
+    the first quarter period of the slowest sine, after which the hysteresis no longer depends on
+    how the motion began; ValueError if that leaves none.
     """
     quarter = 0.5 * np.pi / min(omega for _, omega in components)
     steady = (max(RAMP_DURATION, quarter), duration - RAMP_DURATION)
@@ -99,10 +99,10 @@ def there_and_back(reach: float, speed: float) -> Signal:
 def again_with_hold(reach: float, speed: float) -> Signal:
     """The strokes of :func:`there_and_back` again, a hold, and one small reversal loop.
 
-    Made some time after these, one visit of a branch is judged by the other. The hold of 5 s
-    tells friction, which stays, from what relaxes: at one speed they are one thing. It is on the
-    way back, as at the end of a stroke an error of a joint stop's form counts all the while. The
-    small loop shows what a reversal does in the middle of a stroke.
+    Made some time after these, each branch is validated on its second visit. The hold of 5 s
+    separates friction, which persists, from relaxation: at one speed they are confounded. It is on
+    the way back, because at the end of a stroke an error in the form of a joint stop would weigh on
+    all of it. The small loop shows a reversal in the middle of a stroke.
     """
     return sequence(
         'there and back again',
@@ -229,7 +229,7 @@ MOTIONS: dict[str, Callable[[], Motion]] = {
     'non_periodic': lambda: both_joints(non_periodic_signal()),
     'commissioning': commissioning_motion,
 }
-"""What makes each motion, by its name."""
+"""Factory of each motion, by its name."""
 
 
 def motion_by_name(name: str) -> Motion:

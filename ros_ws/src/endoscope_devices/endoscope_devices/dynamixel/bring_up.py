@@ -53,7 +53,7 @@ def wanted_registers(settings: BusSettings) -> dict[Register, int]:
 
 
 def bring_up(bus: PacketHandler, device: int, settings: BusSettings) -> ServoModel:
-    """Set one servo up with its torque off, and say what it is.
+    """Set one servo up with its torque off, and return its model.
 
     Registers of the EEPROM, which wears, are written only where they differ. BusError where the
     servo does not answer, is another model, reports a hardware error, or does not keep what was
@@ -76,7 +76,7 @@ def bring_up(bus: PacketHandler, device: int, settings: BusSettings) -> ServoMod
 
 
 def is_emulated(bus: PacketHandler, device: int) -> bool:
-    """Say whether a servo is one of this project's emulators; BusError where it does not answer."""
+    """Return whether a servo is one of this project's emulators; BusError if it does not answer."""
     # Of a length that nothing else has, as in `verify`.
     area = (MODEL_NUMBER, MODEL_INFORMATION, FIRMWARE_VERSION)
     return _read_area(bus, device, area)[MODEL_INFORMATION] == EMULATED
@@ -140,7 +140,7 @@ def enable(bus: PacketHandler, goals: Mapping[int, int], settings: BusSettings) 
         bus.write_register(device, GOAL_POSITION, goal)
         verify(bus, device, settings, but=BUS_WATCHDOG)
         kept = bus.read_register(device, GOAL_POSITION)
-        # The shaft may give way meanwhile, and firmware that follows it is no fault.
+        # The shaft may yield meanwhile, and firmware that follows it is no fault.
         if abs(kept - goal) * COUNT > JITTER:
             raise BusError(
                 f'servo {device} is not enabled: Goal Position(116) reads {kept} instead of {goal}'

@@ -1,8 +1,8 @@
-"""The thread that owns a bus: one sync write and one sync read a cycle, and what follows failure.
+"""The thread that owns a bus: one sync write and one sync read per cycle, and error handling.
 
-Motion needs the bus to be *armed*, which only :meth:`BusThread.set_torque` does. Whatever goes
-wrong disarms it for good: goals are ignored then, and the position measured at that moment is held
-as far as the servos still obey.
+Motion needs the bus to be *armed*, which only :meth:`BusThread.set_torque` does. Any error disarms
+it until then: goals are ignored, and the position measured at that moment is held as far as the
+servos still obey.
 """
 
 import queue
@@ -64,7 +64,7 @@ class TimedReading:
 
 @dataclass
 class ServoHealth:
-    """What is known of a servo beside its motion."""
+    """State of a servo other than its motion."""
 
     model: str = ''
     emulated: bool = False  # whether it says that it is one of this project's emulators
@@ -76,7 +76,7 @@ class ServoHealth:
 
 @dataclass
 class BusFigures:
-    """What the thread counts."""
+    """Counters of the thread."""
 
     cycles: int = 0
     readings: int = 0  # cycles that gave a new reading of all servos
@@ -144,7 +144,7 @@ class BusThread:
         self._reboot_wanted.set()
 
     def trouble(self) -> str:
-        """What is wrong; a trouble that has passed is still told for a while."""
+        """The error, empty if none; one that has passed is still reported for a while."""
         if self._thread.ident is not None and not self._thread.is_alive():
             return 'the thread of the bus has ended; restart the motor driver'
         recent = time.monotonic_ns() - self._trouble_ns < _TROUBLE_SHOWN_S * 1e9

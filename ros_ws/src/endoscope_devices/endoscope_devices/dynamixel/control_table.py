@@ -112,7 +112,7 @@ INDIRECT_DATA = 224
 
 @dataclass(frozen=True)
 class ServoModel:
-    """What the e-manual's 'Specifications' say of a servo at 12 V."""
+    """'Specifications' of the e-manual for a servo at 12 V."""
 
     name: str  # as printed on it
     torque_constant: float  # stall torque by stall current, N m/A
@@ -144,7 +144,7 @@ ALERT = 0x80
 
 
 def error_in_words(error: int) -> str:
-    """What the error byte of a status packet says (e-manual 'Protocol 2.0', 'Error').
+    """The error byte of a status packet in words (e-manual 'Protocol 2.0', 'Error').
 
     Its highest bit alone means that Hardware Error Status(70) is not zero.
     """

@@ -1,4 +1,4 @@
-"""Finds ports and servos, and says what to change before they can be used."""
+"""Finds ports and servos, and advises what to change before they can be used."""
 
 import errno
 from collections.abc import Sequence
@@ -42,12 +42,12 @@ _WANTED_RATE = 1000.0
 _WANTED_LATENCY_S = 1e-3
 _NEAR_LIMIT_DEGC = 10
 _ATTEMPTS = 3
-"""Questions until a servo is taken to be silent: one reply may be lost on a busy computer."""
+"""Requests before a servo is considered silent: one reply may be lost on a busy computer."""
 
 
 @dataclass
 class ServoFinding:
-    """What a servo says of itself."""
+    """Identity and state of a servo."""
 
     device: int
     baud: int  # speed in bit/s at which it was found
@@ -77,7 +77,7 @@ class ServoFinding:
 
 @dataclass
 class PortFinding:
-    """What is behind a port."""
+    """Servos and settings of a port."""
 
     port: str  # device file
     latency: float | None = None  # timer in s; None where the adapter has none
@@ -104,7 +104,7 @@ def examine(port: str, bauds: Sequence[int] = tuple(BAUD_CODES.values())) -> Por
         for baud in bauds:
             _listen(finding, baud)
     except DeviceError as error:
-        finding.advice.append(_told(port, error))
+        finding.advice.append(_advice_for(port, error))
     except OSError as error:
         finding.advice.append(f'{port}: the adapter is gone ({error}); plug it in again')
     else:
@@ -123,7 +123,7 @@ def reboot(port: str, baud: int, device: int) -> None:
 
 
 def advise(finding: PortFinding) -> list[str]:
-    """Say what to change about what was found at a port that could be used."""
+    """Return what to change at a port that could be opened."""
     advice = []
     if finding.latency is not None and finding.latency > _WANTED_LATENCY_S:
         name = Path(finding.port).resolve().name
@@ -208,7 +208,7 @@ def _ask(bus: PacketHandler, servo: ServoFinding) -> None:
     servo.complete = True
 
 
-def _told(port: str, error: DeviceError) -> str:
+def _advice_for(port: str, error: DeviceError) -> str:
     cause = error.__cause__
     if isinstance(cause, OSError) and cause.errno == errno.EACCES:
         return f'{port}: no permission: sudo usermod -a -G dialout $USER, and log in again'

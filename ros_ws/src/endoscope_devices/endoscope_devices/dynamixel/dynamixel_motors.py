@@ -48,11 +48,11 @@ class DynamixelMotors:
         return dataclasses.replace(newest.reading, age=age)
 
     def trouble(self) -> str:
-        """Trouble of the bus or of a servo."""
+        """Error of the bus or of a servo."""
         return self.bus.trouble()
 
     def health(self) -> dict[str, object]:
-        """What diagnostics shall show of the bus."""
+        """Figures of the bus for diagnostics."""
         bus = self.bus
         figures = bus.figures
         values: dict[str, object] = {
@@ -74,5 +74,5 @@ class DynamixelMotors:
         return values
 
     def close(self) -> None:
-        """Switch torque off if that is still possible, and let go of the port."""
+        """Switch torque off if that is still possible, and close the port."""
         self.bus.stop()

@@ -2,9 +2,9 @@
 
 What differs from the SDK's packet handler: requests are stuffed, an answer is taken by id, kind and
 length after the line was emptied, each servo's error byte is kept, and the time-out is the time on
-the wire plus a margin instead of 34 ms of busy waiting. An answer does not say which register it
-holds, so no two reads of single servos in a row ask for the same number of bytes: what a line
-repeats of the first is then no answer to the second.
+the wire plus a margin instead of 34 ms of busy waiting. An answer does not name its register, so no
+two reads of single servos in a row request the same number of bytes: a repeated answer to the first
+is then none to the second.
 """
 
 import time
@@ -42,7 +42,7 @@ _LONGEST_RETURN_DELAY_S = 254 * RETURN_DELAY_UNIT
 
 
 class Reply(NamedTuple):
-    """What a servo answered."""
+    """Answer of a servo."""
 
     error: int  # error byte; the alert bit alone is no refusal
     data: bytes  # parameters after the error byte
@@ -87,7 +87,7 @@ class AnswerCollector:
 
 
 class BusError(DeviceError):
-    """A servo did not do what it was asked; the message names it."""
+    """A servo did not carry out a request; the message names it."""
 
 
 class NoReplyError(BusError):
@@ -96,7 +96,7 @@ class NoReplyError(BusError):
 
 @dataclass
 class BusCounts:
-    """What has been seen on the bus."""
+    """Counters of the bus."""
 
     requests: int = 0  # that want an answer
     answers: int = 0  # taken
@@ -107,7 +107,7 @@ class BusCounts:
 
 @dataclass
 class PacketHandler:
-    """Speaks Protocol 2.0 on an open port."""
+    """Protocol 2.0 on an open port."""
 
     port: BusPort
     margin: float = REPLY_MARGIN_S  # s granted to an answer beyond its time on the wire
@@ -129,9 +129,9 @@ class PacketHandler:
         )
 
     def drain(self, quiet: float) -> None:
-        """Throw away what still arrives, so that it answers no later request.
+        """Discard bytes that still arrive, so that they answer no later request.
 
-        It must be quiet for `quiet` s; a line that never is is left after ten times that.
+        Ends once the line has been quiet for `quiet` s, or after ten times that.
         """
         latest = time.monotonic() + 10.0 * quiet
         while self.port.receive(time.monotonic() + quiet) and time.monotonic() < latest:

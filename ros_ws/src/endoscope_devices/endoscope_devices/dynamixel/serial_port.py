@@ -1,4 +1,4 @@
-"""The SDK's port handler with what it lacks: 4.5 Mbaud, one owner, and waiting without spinning."""
+"""The SDK's port handler, extended by 4.5 Mbaud, exclusive access, and blocking waits."""
 
 import select
 import termios
@@ -21,7 +21,7 @@ def byte_time(baud: int) -> float:
 
 
 def latency_timer(port_name: str) -> float | None:
-    """Time in s that a USB adapter of FTDI holds short replies back; None if it says nothing."""
+    """Latency timer in s of a USB adapter of FTDI; None if it has none."""
     file = _TTY / Path(port_name).resolve().name / 'device' / 'latency_timer'
     return float(file.read_text()) * 1e-3 if file.is_file() else None
 
@@ -44,7 +44,7 @@ class BusPort(PortHandler):
         return True
 
     def clearPort(self) -> None:
-        """Throw away what has been received; raises OSError when the adapter is gone."""
+        """Discard received bytes; raises OSError when the adapter is gone."""
         try:
             super().clearPort()
         except termios.error as error:
@@ -62,7 +62,7 @@ class BusPort(PortHandler):
             raise DeviceError(f'{self.port_name}: servos do not know {self.baudrate} baud: {known}')
 
     def close(self) -> None:
-        """Let go of the port, open or not."""
+        """Close the port, open or not."""
         if self.ser is not None:
             self.closePort()
 

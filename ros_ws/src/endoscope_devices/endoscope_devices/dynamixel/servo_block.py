@@ -1,4 +1,4 @@
-"""What is read from every servo in every cycle, and whether it can be true and was just taken."""
+"""The block read from every servo in every cycle, and its check for plausibility and freshness."""
 
 import struct
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from endoscope_devices.dynamixel.control_table import (
 )
 
 _MS = 1_000_000
-# Present current, velocity and position are ten contiguous bytes. The bus watchdog says whether the
+# Present current, velocity and position are ten contiguous bytes. The bus watchdog shows that the
 # servo has stopped by itself, and is a canary: a servo that restarted has lost its indirect
 # addresses, and then every byte of the block reads 0, which would be a position.
 _MAPPED = (
@@ -35,7 +35,7 @@ JITTER = 0.02
 
 
 class Freshness(Enum):
-    """What the tick says of a reading."""
+    """Verdict of the tick on a reading."""
 
     NEW = 'new'
     SAME_TICK = 'same tick'

@@ -33,7 +33,7 @@ class ServoMount:
 
 @dataclass(frozen=True)
 class BusSettings:
-    """Everything about the bus that a person may want to change."""
+    """Settings of the bus."""
 
     port: str  # device file
     baud: int = 1_000_000  # bit/s

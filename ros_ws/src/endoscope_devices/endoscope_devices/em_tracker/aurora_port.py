@@ -54,7 +54,7 @@ def crc16(data: bytes) -> int:
 
 
 class TrackerReplyError(DeviceError):
-    """A reply that is missing, spoilt, or says that the tracker refused."""
+    """A reply that is missing, corrupt, or a refusal by the tracker."""
 
     def __init__(self, command: str, words: str, *, silent: bool = False) -> None:
         super().__init__(f'tracker, {command} {words}')
@@ -116,8 +116,8 @@ class AuroraPort:
     def fence(self) -> None:
         """Make sure that no earlier reply is still to come; DeviceError where it has not come yet.
 
-        The tracker answers in order: once the line has been quiet and the tracker then told its
-        revision, nothing older is under way.
+        The tracker answers in order: once the line has been quiet and the tracker has then sent
+        its revision, nothing older is under way.
         """
         if self._line is not None:
             try:
@@ -132,7 +132,7 @@ class AuroraPort:
             raise TrackerReplyError('APIREV:', 'another reply')
 
     def close(self) -> None:
-        """Let the tracker be found at 9600 baud, and let go of the port."""
+        """Return the tracker to 9600 baud, and release the port."""
         if self._line is None:
             return
         try:

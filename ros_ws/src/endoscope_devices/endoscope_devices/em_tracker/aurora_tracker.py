@@ -19,8 +19,8 @@ _REOPEN_S = 0.3
 _KEPT = 200
 _PAUSE_S = 0.002
 _GIVE_UP = 5
-# So many frames in a row that are late, a second of them, or replies whose frame number cannot be,
-# mean that the frames lie otherwise than thought.
+# So many late frames in a row, a second of them, or replies with an impossible frame number, mean
+# that the estimate of the frame times is wrong.
 _FOR_GOOD = 40
 # So far before its time a frame may seem to come: the replies before it may have waited as long.
 _AHEAD_NS = 100_000_000
@@ -31,8 +31,8 @@ class FrameClock:
 
     Frames are equally spaced; a reply comes after its frame by a time that varies. The earliest
     reply, relative to its number, shows where the frames lie (NDI advises to use the frame number,
-    not the host's clock, to tell when data was collected). The line follows clocks that drift apart
-    by up to ``1e-4``.
+    not the host's clock, for the time of collection). The line follows clocks that drift apart by
+    up to ``1e-4``.
     """
 
     def __init__(self, rate: float) -> None:
@@ -85,7 +85,7 @@ class TrackerReading:
 
 
 class TrackerDevice(Protocol):
-    """What the node `em_tracker` asks of a tracker, of whatever maker.
+    """Interface of a tracker of any maker, for the node `em_tracker`.
 
     A real one reads in a thread of its own: no call waits for the tracker.
     """
@@ -100,16 +100,16 @@ class TrackerDevice(Protocol):
         """What is wrong (empty if nothing), and figures for diagnostics."""
 
     def close(self) -> None:
-        """Let go of the tracker."""
+        """Release the tracker."""
 
 
 class AuroraTracker(ReadingThread[TrackerReading]):
-    """Asks for the newest frame again and again, and keeps each that is new and shows the sensor.
+    """Polls the newest frame, and keeps each that is new and shows the sensor.
 
-    A reply that is whole but old, because something on the way kept it, has a right CRC; its frame
-    number betrays it.  Numbers increase, and no faster than the frame clock.  A pose that the tip
-    cannot have come to is left out as well (`PoseCheck`).  A tracker that goes away, or counts its
-    frames anew, is opened again for as long as the device is open.
+    A whole reply that was buffered on the way has a valid CRC; its frame number identifies it as
+    old.  Numbers increase, and no faster than the frame clock.  A pose that the tip cannot have
+    reached is dropped as well (`PoseCheck`).  A tracker that disconnects, or restarts its frame
+    count, is reopened for as long as the device is open.
     """
 
     def __init__(self, port: str, settings: TrackerSettings) -> None:

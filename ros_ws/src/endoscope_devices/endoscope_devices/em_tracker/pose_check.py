@@ -1,4 +1,4 @@
-"""Tells a pose that the sensor cannot have come to since the last one."""
+"""Detects poses that the sensor cannot have reached since the last one."""
 
 import math
 

@@ -1,11 +1,11 @@
-"""Tells a broken, saturated, frozen or spiking load cell from a real tension."""
+"""Detects broken, saturated, frozen and spiking load cells."""
 
 import math
 from collections import deque
 
 from endoscope_devices.load_cells.calibration_file import FaultLimits, WireCell
 
-# So many good readings in a row end a fault, and so many of one mind make a step a new level.
+# So many good readings in a row end a fault, and so many consistent ones make a step a new level.
 CONFIRMATIONS = 3
 _SPIKES = 5
 _SPIKES_WITHIN_NS = 1_000_000_000
@@ -16,11 +16,11 @@ class ChannelCheck:
 
     Broken: the count is not a number, or beyond ``broken_below`` and ``broken_above``, where only
     an open bridge drives the amplifier. Saturated: beyond ``saturated_*``. Frozen: not one count of
-    change for ``frozen_after`` seconds; the noise of a living cell changes its last digit. Spiking:
-    a change faster than ``spike_rate``; three readings in a row that agree with each other are a
-    new level. With five spikes in a second the whole channel is not believed. This is all that
-    tells an old reply of Modbus RTU, which has no number: kept on the way and sent again, it is
-    left out where the tension has gone on by more than a wire can in one interval.
+    change for ``frozen_after`` seconds; the noise of a working cell changes its last digit.
+    Spiking: a change faster than ``spike_rate``; three consistent readings in a row are a new
+    level. With five spikes in a second the whole channel is rejected. An old reply of Modbus RTU,
+    which has no transaction number, is detected only here: delayed and sent again, it is dropped
+    where the tension has changed by more than a wire can in one interval.
     """
 
     def __init__(self, wire: str, cell: WireCell, limits: FaultLimits) -> None:

@@ -35,7 +35,7 @@ class ReplyTrouble(StrEnum):
 
 
 class ReplyError(Exception):
-    """A reply that is not accepted, and of what kind its trouble is."""
+    """A reply that is not accepted, with the kind of error."""
 
     def __init__(self, trouble: ReplyTrouble, words: str) -> None:
         super().__init__(f'{trouble}: {words}')
@@ -57,9 +57,9 @@ class Framing(ABC):
 
     @abstractmethod
     def length(self, head: bytes) -> int:
-        """How long the reply is, as far as its first bytes tell.
+        """Length of the reply, as far as its first bytes determine it.
 
-        At least two bytes more are always wanted than decide.
+        Always at least two bytes more than those that determine it.
         """
 
     @abstractmethod
@@ -107,7 +107,7 @@ class RtuFraming(Framing):
         return 5 + head[2]
 
     def accept(self, reply: bytes) -> tuple[int, ...] | None:
-        """See :class:`Framing`; RTU replies carry nothing that tells an earlier one."""
+        """See :class:`Framing`; RTU replies have no transaction number to detect an earlier one."""
         if len(reply) < 5:
             raise ReplyError(ReplyTrouble.MALFORMED, f'{len(reply)} bytes')
         if not FramerRTU.check_CRC(reply[:-2], int.from_bytes(reply[-2:], 'big')):

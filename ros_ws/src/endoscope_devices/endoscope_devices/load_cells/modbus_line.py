@@ -31,7 +31,7 @@ class Line[Opened: serial.Serial | socket.socket](ABC):
 
     @abstractmethod
     def open(self) -> None:
-        """Connect; LineLostError, which says what to look at, where it cannot be opened."""
+        """Connect; LineLostError with advice where it cannot be opened."""
 
     def write(self, data: bytes) -> None:
         """Send bytes."""
@@ -55,7 +55,7 @@ class Line[Opened: serial.Serial | socket.socket](ABC):
         return data
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close the line."""
         if self._handle is not None:
             self._handle.close()
             self._handle = None

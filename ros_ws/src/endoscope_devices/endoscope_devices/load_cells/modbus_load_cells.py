@@ -39,7 +39,7 @@ class WireReading:
 
 
 class LoadCellDevice(Protocol):
-    """What the node `load_cells` asks of load cells, of whatever maker.
+    """Interface of load cells of any maker, for the node `load_cells`.
 
     A real one reads in a thread of its own: no call waits for the cells.
     """
@@ -67,14 +67,14 @@ class LoadCellDevice(Protocol):
         """What is wrong (empty if nothing), and figures for diagnostics."""
 
     def close(self) -> None:
-        """Let go of the cells."""
+        """Release the cells."""
 
 
 class ModbusLoadCells(ReadingThread[WireReading]):
-    """Reads all wires at the calibration's rate and keeps what can be believed.
+    """Reads all wires at the calibration's rate and keeps the valid readings.
 
-    A reading in which one channel cannot be believed is no reading: the others would pass for a
-    whole one.  A line that goes away is opened again for as long as the device is open.
+    A reading with one invalid channel is dropped as a whole.  A lost line is reopened for as long
+    as the device is open.
     """
 
     def __init__(self, calibration: LoadCellCalibration, line: Line, framing: Framing) -> None:
@@ -213,4 +213,4 @@ CONNECTIONS: dict[str, Callable[[str, LoadCellCalibration], LoadCellDevice]] = {
     'modbus_rtu': modbus_rtu,
     'modbus_tcp': modbus_tcp,
 }
-"""What opens load cells, by the name of how they are connected."""
+"""Factory of load cells, by kind of connection."""

@@ -1,4 +1,4 @@
-"""Asks a transmitter for registers and makes sure that the answer belongs to the question."""
+"""Reads registers of a transmitter and matches each reply to its request."""
 
 import time
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from endoscope_devices.load_cells.modbus_framing import Framing, ReplyError, Rep
 from endoscope_devices.load_cells.modbus_line import LONGEST, Line
 
 # After each fence that failed, the next waits for a longer silence: the fewer are under way at a
-# time, the later an answer may come and still be told from the others.
+# time, the later an answer may come and still be matched to its request.
 _LONGER = 8
 _LONGEST_SILENCE_NS = 1_000_000_000
 
@@ -21,13 +21,13 @@ class RegisterReading:
 
 
 class RegisterReader:
-    """One question at a time on one line, which the caller has opened.
+    """One request at a time on one line, which the caller has opened.
 
-    Modbus RTU replies do not say which request they answer: a late one looks like the answer to the
-    next. So after a silence, and after bytes that nobody asked for, a fence is put up: registers
-    are asked for in another number, and until the answer to that has come, which a transmitter
-    gives in order, nothing counts. Fences ask for different numbers in turn: a late answer to one
-    of them must not open the next.
+    Modbus RTU replies do not identify their request: a late one looks like the reply to the next.
+    So after a time-out, and after unsolicited bytes, a fence is set: another number of registers is
+    requested, and until its reply has come, which a transmitter sends in order, all replies are
+    ignored. Consecutive fences request different numbers: a late reply to one of them must not open
+    the next.
     """
 
     def __init__(self, line: Line, framing: Framing, reply_timeout: float) -> None:

@@ -1,4 +1,4 @@
-"""Carries bytes between two file descriptors, and spoils them as a test wants."""
+"""Relays bytes between two file descriptors, with faults chosen by a test."""
 
 import heapq
 import os
@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 
-# What becomes of bytes: pieces, each with the seconds after which it arrives. Nothing overtakes.
+# What happens to bytes: pieces, each with its delay in s. Nothing overtakes.
 Tap = Callable[[bytes], Sequence[tuple[float, bytes]]]
 
 _CHUNK = 4096

@@ -17,7 +17,7 @@ class SerialCable(ClosedOnExit):
     def __init__(self, host: Path) -> None:
         # The driver's link to its port; it stays when the cable is plugged in again, as udev's do.
         self.host = host
-        self.to_host: Tap = faithful  # what becomes of bytes on the way; a test sets it
+        self.to_host: Tap = faithful  # what happens to bytes on the way; a test sets it
         self.to_device: Tap = faithful
         self._far_ends = os.openpty()
         tty.setraw(self._far_ends[1])

@@ -11,7 +11,7 @@ class TcpCable(ClosedOnExit):
     """Carries connections at a port of its own to a server on this machine."""
 
     def __init__(self, server_port: int) -> None:
-        self.to_host: Tap = faithful  # what becomes of bytes on the way; a test sets it
+        self.to_host: Tap = faithful  # what happens to bytes on the way; a test sets it
         self.to_device: Tap = faithful
         self._server_port = server_port
         self._listener = socket.create_server(('127.0.0.1', 0))
@@ -26,7 +26,7 @@ class TcpCable(ClosedOnExit):
             try:
                 near, _ = self._listener.accept()
             except OSError:
-                # Closing the listener is how this thread is told to end.
+                # Closing the listener is the signal for this thread to end.
                 return
             try:
                 far = socket.create_connection(('127.0.0.1', self._server_port))

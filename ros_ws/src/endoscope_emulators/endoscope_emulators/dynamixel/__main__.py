@@ -50,7 +50,7 @@ def main() -> int:
 
 
 def _go_before_other_processes() -> None:
-    """Hardware does not wait for a busy processor; only some users may say so."""
+    """Raise the priority: hardware does not wait for a busy processor; not all users may."""
     try:
         os.nice(_NICENESS)
     except PermissionError:

@@ -41,9 +41,8 @@ _IDLE_S = 5e-3
 class EmulatedBus(ClosedOnExit):
     """A line with servos, served by a thread.
 
-    Bytes take the time that the line's speed says, both ways; a servo that is set to another speed
-    than the line hears nothing. The path `link` leads to the terminal while it is plugged in, as
-    udev's do.
+    Bytes take their time at the line's speed, both ways; a servo that is set to another speed
+    receives nothing. The path `link` leads to the terminal while it is plugged in, as udev's do.
     """
 
     def __init__(self, servos: Sequence[EmulatedServo], link: Path | None = None) -> None:
@@ -87,7 +86,7 @@ class EmulatedBus(ClosedOnExit):
 
     @contextmanager
     def paused(self) -> Iterator[LineFaults]:
-        """Keep the thread out while faults or servos are changed or looked at."""
+        """Lock the thread out while faults or servos are changed or inspected."""
         with self._lock:
             now = time.monotonic()
             for servo in self.servos.values():

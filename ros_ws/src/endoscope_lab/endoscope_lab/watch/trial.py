@@ -83,8 +83,8 @@ def derived(rows: Sequence[Watched]) -> str:
         lines.append(f"    '{part}': {threshold!r},  # largest seen: {largest:.3g}")
     first, last = rows[0].seed, rows[-1].seed
     return (
-        '"""Gains of the likelihood\'s logarithm at which a change of each part is reported.\n\n'
-        f'From {len(rows) * _HOURS:g} h of motion of rigs that do not change, by\n'
+        '"""Log-likelihood gains at which a change of each part is reported.\n\n'
+        f'From {len(rows) * _HOURS:g} h of motion of unchanged rigs, by\n'
         f'`endoscope bench watch --derive --nominal {first}-{last}`.\n"""\n\n'
         + '\n'.join(['THRESHOLDS = {', *lines, '}'])
         + f'\nFALSE_ALARMS_PER_HOUR = {_PER_HOUR}\n"""Of motion, for which they are derived."""\n'

@@ -18,7 +18,7 @@
     return value - sorted[low] <= sorted[high] - value ? low : high;
   }
 
-  /* A value with the digits that its axis, as it is seen, can tell apart. */
+  /* A value with the digits that its axis resolves at this zoom. */
   function shown(value, {min, max, distr}) {
     if (value == null) return '–';
     if (distr === 3) return String(Number(value.toPrecision(3)));
@@ -141,20 +141,20 @@
       }
       const first = plot.curves.find((c) => c.index != null);
       stretch(plot, first);
-      tell(plot, first);
+      readOut(plot, first);
     }
     figure.at = at;
   }
 
-  function tell(plot, first) {
-    const {told, u, spec} = plot, {x, y} = u.scales;
-    told.hidden = !first;
+  function readOut(plot, first) {
+    const {readout, u, spec} = plot, {x, y} = u.scales;
+    readout.hidden = !first;
     if (!first) return;
     const across = first.x[first.index];
-    told.classList.toggle('on-the-right', u.valToPos(across, 'x') < u.over.clientWidth / 2);
-    told.firstChild.textContent = `${shown(across, x)} ${unitOf(spec.x_label)}`;
+    readout.classList.toggle('on-the-right', u.valToPos(across, 'x') < u.over.clientWidth / 2);
+    readout.firstChild.textContent = `${shown(across, x)} ${unitOf(spec.x_label)}`;
     plot.curves.forEach((curve, k) => {
-      const low = curve.low[curve.index], high = curve.high[curve.index], cell = told.children[k + 1];
+      const low = curve.low[curve.index], high = curve.high[curve.index], cell = readout.children[k + 1];
       cell.hidden = curve.index == null;
       cell.lastChild.textContent = low === high ? shown(low, y) : `${shown(low, y)} … ${shown(high, y)}`;
     });
@@ -318,16 +318,16 @@
     plot.hair.className = 'plot-hair';
     plot.hair.hidden = true;
     over.append(plot.hair);
-    plot.told = document.createElement('div');
-    plot.told.className = 'plot-read';
-    plot.told.hidden = true;
-    plot.told.append(document.createElement('span'));
+    plot.readout = document.createElement('div');
+    plot.readout.className = 'plot-read';
+    plot.readout.hidden = true;
+    plot.readout.append(document.createElement('span'));
     plot.element.querySelectorAll('.plot-key svg').forEach((sign) => {
       const cell = document.createElement('div');
       cell.append(sign.cloneNode(true), '');
-      plot.told.append(cell);
+      plot.readout.append(cell);
     });
-    over.append(plot.told);
+    over.append(plot.readout);
     for (const curve of plot.curves) {
       curve.dot = document.createElement('div');
       curve.dot.className = 'plot-dot';
