@@ -111,7 +111,7 @@ def test_a_command_that_outlives_its_sender_is_not_obeyed(foreign, master, topic
     node = foreign.nodes[reader]
     gates = {
         'motor_driver': lambda: node.motion.gate,
-        'compensator': lambda: node.gate,
+        'compensator': lambda: node.stream.gate,
         'controller': lambda: node._gate,
     }
     gate = gates[reader]()
@@ -207,7 +207,10 @@ def test_a_result_that_outlives_its_sender_is_not_taken(reader):
         ]
         leave_behind(graph, graph.nodes[reader], CALIBRATION_RESULT, result, RESULT)
         graph.advance(0.5)
-        taken = {'compensator': compensator._found, 'master': master._ranges}
+        taken = {
+            'compensator': compensator.law.pending or compensator.law.findings,
+            'master': master._ranges,
+        }
         assert not taken[reader]
         assert graph.state == 'FAULT'
         assert CALIBRATION_RESULT in graph.cause
@@ -287,7 +290,7 @@ def test_a_calibration_node_started_anew_is_believed_after_another_enable():
         graph.calibrate()
         graph.advance(0.1)
         assert graph.state == 'ENABLED'
-        assert graph.nodes['compensator'].findings is not None
+        assert graph.nodes['compensator'].law.findings is not None
         assert graph.nodes['master']._ranges
         graph.kill('compensator')
         graph.advance(0.02)
@@ -295,4 +298,4 @@ def test_a_calibration_node_started_anew_is_believed_after_another_enable():
         graph.advance(0.3)
         graph.enable()
         graph.advance(0.5)
-        assert graph.nodes['compensator'].findings is None
+        assert graph.nodes['compensator'].law.findings is None

@@ -16,6 +16,7 @@ from endoscope_core.control.internal_model import PhysicalParameters, bending_ra
 from endoscope_core.control.limits import MotorLimits
 from endoscope_core.control.physical_inverse import PhysicalInverse
 from endoscope_core.control.plant_learning import PlantLearning
+from endoscope_core.control.range_cut import RangeCut
 from endoscope_core.control.tracker_feedback import AdaptiveBacklashController, TrackerMeasurement
 
 __all__ = [
@@ -37,6 +38,7 @@ __all__ = [
     'PhysicalInverse',
     'PhysicalParameters',
     'PlantLearning',
+    'RangeCut',
     'TrackerMeasurement',
     'adopted_plant',
     'bending_range',

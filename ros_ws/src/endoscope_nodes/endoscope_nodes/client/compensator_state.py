@@ -2,8 +2,7 @@
 
 from diagnostic_msgs.msg import DiagnosticArray
 
-from endoscope_core.choices import BY_ADOPTED
-from endoscope_core.control import AdoptedPlant, FeedforwardLaw
+from endoscope_core.control import FeedforwardLaw
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_nodes.names import JOINTS
 from endoscope_nodes.runtime.diagnostics import OK, diagnostic_array, status
@@ -31,22 +30,3 @@ def compensator_state(
     for joint, parameters in zip(JOINTS, law.parameters, strict=False):
         values |= {f'{joint}.{key}': value for key, value in parameters.to_dict().items()}
     return diagnostic_array(stamp_ns, status('compensator: model', OK, words, values))
-
-
-def model_in_words(
-    wanted: CompensatorParameters,
-    trouble: str,
-    adopted: AdoptedPlant | None,
-    findings: CalibrationFindings | None,
-    remedy: str,
-) -> str:
-    """What is compensated by, or why nothing is; `remedy` is how to calibrate."""
-    if wanted.mode == 'none':
-        return 'no feed-forward'
-    if trouble:
-        return f'no feed-forward: {trouble}'
-    if wanted.selected_by == BY_ADOPTED and adopted is not None:
-        return f'{wanted.mode} by adopted: plant {adopted.hash}'
-    if findings is None:
-        return f'no feed-forward: {wanted.mode} waits for a calibration; {remedy}'
-    return f'{wanted.mode} by {wanted.selected_by}: {findings}'

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import Joy
 from std_msgs.msg import Header
@@ -10,7 +11,7 @@ from endoscope_core.safety import CommandGate, MotionSession, Refusal
 from endoscope_nodes.names import JOINTS, MASTER_CLUTCH, MOTION_SESSION
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
-from endoscope_nodes.runtime.qos import COMMAND, EVENT
+from endoscope_nodes.runtime.qos import COMMAND, EVENT, RESULT
 from endoscope_nodes.runtime.streams import JointSample, JointSubscription
 
 SESSION_REPORT = 'motion session'
@@ -91,6 +92,49 @@ class SessionWatch:
         senders = SenderWatch(self._node, subscription)
         self._streams.append((senders, on_rivals or self.leave))
         return senders
+
+    def one_sender[T](
+        self,
+        subscribe: Callable[[Callable[[T], None]], Subscription],
+        take: Callable[[T], None],
+        on_competing: Callable[[str], None] | None = None,
+    ) -> None:
+        """Give `take` what `subscribe` hears while it has one sender; see :meth:`senders_of`."""
+        otherwise = on_competing or self.leave
+
+        def receive(message: T) -> None:
+            competing = senders.rivals()
+            if competing:
+                otherwise(competing)
+            else:
+                take(message)
+
+        senders = self.senders_of(subscribe(receive), otherwise)
+
+    def results(
+        self,
+        topic: str,
+        take: Callable[[DiagnosticArray], None],
+        on_competing: Callable[[str], None] | None = None,
+    ) -> None:
+        """Give `take` the results on a latched topic while it has one sender."""
+        self.one_sender(
+            lambda receive: self._node.create_subscription(DiagnosticArray, topic, receive, RESULT),
+            take,
+            on_competing,
+        )
+
+    def commands(
+        self,
+        topic: str,
+        gate: CommandGate,
+        take: Callable[[JointSample], None],
+        obeys: bool = False,
+    ) -> None:
+        """Give `take` the commands of joints on a topic; see :class:`CommandInput`."""
+        CommandInput(self._node, self, topic, gate, take)
+        if obeys:
+            self.obeys(topic, gate)
 
     def obeys(self, topic: str, gate: CommandGate) -> None:
         """End the node's part where a gate refuses what comes on a topic rather than obey it."""
@@ -208,8 +252,11 @@ class ClutchWatch:
         self._on_release = on_release
         self._pressed = self._doubted = False
         self._heard_ns = 0
-        subscription = node.create_subscription(Joy, MASTER_CLUTCH, self._receive, EVENT)
-        self._senders = session.senders_of(subscription, self._doubt)
+        session.one_sender(
+            lambda receive: node.create_subscription(Joy, MASTER_CLUTCH, receive, EVENT),
+            self._receive,
+            self._doubt,
+        )
 
     def _doubt(self, rivals: str) -> None:
         self._doubted = True
@@ -217,10 +264,6 @@ class ClutchWatch:
         self._session.leave(rivals)
 
     def _receive(self, message: Joy) -> None:
-        rivals = self._senders.rivals()
-        if rivals:
-            self._doubt(rivals)
-            return
         before = self._pressed
         pressed = bool(message.buttons) and message.buttons[0] == 1
         self._doubted = self._doubted and pressed
