@@ -167,3 +167,9 @@ def words_of(errors: Array, wires: Sequence[str]) -> str:
         if abs(error) > WORTH_TELLING
     ]
     return f'zero of a load cell is off: {", ".join(told)}; set it again' if told else ''
+
+
+def with_zeros(message: str, errors: Array | None, wires: Sequence[str]) -> str:
+    """A message, and what zeros of cells are off by where `errors`, in N, are large."""
+    words = '' if errors is None else words_of(errors, wires)
+    return f'{message}; {words}' if words else message

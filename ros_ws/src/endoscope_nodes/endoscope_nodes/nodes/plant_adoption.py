@@ -6,12 +6,12 @@ from concurrent.futures import Future
 
 from diagnostic_msgs.msg import DiagnosticArray
 
+from endoscope_core.calibration import OrderState
 from endoscope_core.choices import BY_ADOPTED, PHYSICAL
 from endoscope_core.compensation import LawInForce, Selection
 from endoscope_core.control import AdoptedPlant, AdoptionError, adopted_plant
 from endoscope_core.safety import AdoptionCode
 from endoscope_nodes import names
-from endoscope_nodes.client.order_feedback import OrderState
 from endoscope_nodes.client.plant_adoption import AdoptionRequest, PlantInForce
 from endoscope_nodes.runtime.beside import Beside
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
