@@ -1,6 +1,5 @@
 """What the tensions of a calibration say of the tube: its class, and the plant of each joint."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +20,7 @@ from endoscope_core.identification.plant_fit import (
     plants_of_calibration,
     size_of_explained,
 )
+from endoscope_core.names import JOINTS
 from endoscope_core.signals import CALIBRATION_RATE, CalibrationMotion
 
 # Less is no tenth of a newton in words.
@@ -36,13 +36,13 @@ class Judgement:
     # What each joint's wires have lost of their pretension in N, where the plant named the class.
     lost: list[float] | None = None
 
-    def lost_in_words(self, joints: Sequence[str]) -> str:
+    def lost_in_words(self) -> str:
         """That the plant named the class, and what wires have lost; empty where it did not."""
         if self.lost is None:
             return ''
         losses = [
             f'{joint} {x:.1f} N'
-            for joint, x in zip(joints, self.lost, strict=True)
+            for joint, x in zip(JOINTS, self.lost, strict=True)
             if x >= _WORTH_TELLING_N
         ]
         lost = f'; the wires have lost pretension ({", ".join(losses)}): tighten them'

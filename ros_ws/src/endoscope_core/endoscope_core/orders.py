@@ -10,22 +10,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.calibration import (
-    CALIBRATE,
-    HOME,
     BendingRecord,
-    CalibrationCommand,
     CalibrationRun,
     CalibrationStep,
-    OrderCode,
-    OrderFeedback,
-    OrderState,
     TensionGapError,
     with_zeros,
     zero_errors,
 )
+from endoscope_core.calibration.calibration_run import CalibrationCommand
+from endoscope_core.calibration.order_feedback import (
+    CALIBRATE,
+    HOME,
+    OrderCode,
+    OrderFeedback,
+    OrderState,
+)
 from endoscope_core.classifier.classification import ClassifierError, UnseenTensionError
 from endoscope_core.identification.plant_fit import PlantFitError
 from endoscope_core.judgement import Judgement
+from endoscope_core.names import JOINTS, MOTORS, WIRES
 from endoscope_core.rig import Rig
 from endoscope_core.safety import TensionGuard
 from endoscope_core.safety.guards import TOLD_RAD
@@ -37,14 +40,6 @@ Judge = Callable[[Array], Future[Judgement]]
 
 _TICK_NS = 1_000_000
 _FED_NS = 100_000_000
-
-
-class Names(NamedTuple):
-    """Names of a rig's parts, for sentences."""
-
-    joints: tuple[str, ...]
-    motors: tuple[str, ...]
-    wires: tuple[str, ...]
 
 
 class Pose(NamedTuple):
@@ -73,8 +68,8 @@ class Order(ABC):
 
     name: ClassVar[str]
 
-    def __init__(self, run: CalibrationRun, names: Names, began_ns: int) -> None:
-        self.run, self.names, self.began_ns = run, names, began_ns
+    def __init__(self, run: CalibrationRun, began_ns: int) -> None:
+        self.run, self.began_ns = run, began_ns
 
     @property
     def phase(self) -> str:
@@ -102,7 +97,7 @@ class HomeOrder(Order):
             return None
         away = [
             f'{name} at {x:.3f} rad'
-            for name, x in zip(self.names.motors, pose.shafts or (), strict=False)
+            for name, x in zip(MOTORS, pose.shafts or (), strict=False)
             if abs(x) > TOLD_RAD
         ]
         if pose.shafts and not away:
@@ -124,11 +119,9 @@ class CalibrationOrder(Order):
 
     name = CALIBRATE
 
-    def __init__(
-        self, run: CalibrationRun, names: Names, began_ns: int, motion: str, judge: Judge
-    ) -> None:
-        super().__init__(run, names, began_ns)
-        self.bending = BendingRecord(len(names.joints))
+    def __init__(self, run: CalibrationRun, began_ns: int, motion: str, judge: Judge) -> None:
+        super().__init__(run, began_ns)
+        self.bending = BendingRecord(len(JOINTS))
         self._motion, self._judge = motion, judge
         self._zeros: Array | None = None
         self._judging: Future[Judgement] | None = None
@@ -153,7 +146,7 @@ class CalibrationOrder(Order):
     def _judged(self, judging: Future[Judgement]) -> Ending:
         error = judging.exception()
         if isinstance(error, UnseenTensionError):
-            words = with_zeros(str(error), self._zeros, self.names.wires)
+            words = with_zeros(str(error), self._zeros)
             log = f'{words}; the motion is not compensated'
             return Ending(words, OrderCode.UNKNOWN_TUBE, log, str(error), zeros=self._zeros)
         if isinstance(error, ClassifierError | PlantFitError):
@@ -163,8 +156,8 @@ class CalibrationOrder(Order):
         # Backlash size is that under the sinusoid: faster motion has a wider loop.
         if self.run.record is not None and self._motion == SINUSOID:
             backlash = self.bending.backlash_size(self.run.record.start_ns)
-        named = f'class {found.verdict.class_deg} deg{found.lost_in_words(self.names.joints)}'
-        words = with_zeros(named, self._zeros, self.names.wires)
+        named = f'class {found.verdict.class_deg} deg{found.lost_in_words()}'
+        words = with_zeros(named, self._zeros)
         log = f'{words}, probability {found.verdict.probability:.3f}'
         return Ending(words, log=log, judgement=found, backlash=backlash, zeros=self._zeros)
 
@@ -183,7 +176,6 @@ class Orders:
     def __init__(
         self,
         rig: Rig,
-        names: Names,
         motion: CalibrationMotion,
         judge: Judge,
         *,
@@ -193,11 +185,10 @@ class Orders:
     ) -> None:
         self.order: Order | None = None
         self.feedback = OrderFeedback()
-        self.guard = TensionGuard(names.wires, rig.tension.calibration_ceiling)
+        self.guard = TensionGuard(WIRES, rig.tension.calibration_ceiling)
         self.last = ''  # what came of the last order
         self.completed = self.aborted = self.refused = 0
-        self._joints, self._names = rig.joints, names
-        self._motion, self._judge = motion, judge
+        self._joints, self._motion, self._judge = rig.joints, motion, judge
         self._return_speed, self._rest = return_speed, rest
         self._newest = self._fed_ns = 0
         reach, amplitude = rig.joints.reach, motion.amplitude
@@ -221,7 +212,7 @@ class Orders:
             return replace(given, state=OrderState.REJECTED, code=code, words=words)
         run = CalibrationRun(
             self._joints.entry([x / self._joints.gear for x in pose.shafts]),
-            len(self._names.wires),
+            len(WIRES),
             _TICK_NS,
             self._return_speed,
             self._rest,
@@ -229,9 +220,9 @@ class Orders:
             self._motion,
         )
         self.order = (
-            HomeOrder(run, self._names, now_ns)
+            HomeOrder(run, now_ns)
             if name == HOME
-            else CalibrationOrder(run, self._names, now_ns, self._motion.name, self._judge)
+            else CalibrationOrder(run, now_ns, self._motion.name, self._judge)
         )
         self.feedback = replace(
             given, state=OrderState.EXECUTING, phase=self.order.phase, words=str(run.step)
@@ -262,7 +253,7 @@ class Orders:
 
     def add_bending(self, stamp_ns: int, angle: Sequence[float]) -> None:
         """Take a measurement of the tracker (J,) in rad."""
-        if isinstance(self.order, CalibrationOrder) and len(angle) == len(self._names.joints):
+        if isinstance(self.order, CalibrationOrder) and len(angle) == len(JOINTS):
             self.order.bending.add(stamp_ns, angle)
 
     def command(self, stamp_ns: int, periods: int) -> CalibrationCommand | None:

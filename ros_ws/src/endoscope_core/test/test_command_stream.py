@@ -3,15 +3,8 @@
 import numpy as np
 import pytest
 
-from endoscope_core.compensation import (
-    Command,
-    CommandStream,
-    CommandTopics,
-    LawInForce,
-    Measured,
-    Selection,
-    Source,
-)
+from endoscope_core.compensation.command_stream import Command, CommandStream, Measured, Source
+from endoscope_core.compensation.law_in_force import LawInForce, Selection
 from endoscope_core.control import AdoptionError, Feedforward, FeedforwardSettings, MotorLimits
 from endoscope_core.identification.law_choice import CalibrationFindings, LawChoice
 from endoscope_core.rig import shipped_rig
@@ -33,9 +26,7 @@ class Slave:
             Selection('none', 'class'),
         )
         self.law.findings = CalibrationFindings(ranges=ranges)
-        topics = CommandTopics('slave/servo_jp', 'motor/measured_js')
-        names = ('bend_x', 'bend_y'), ('motor_x', 'motor_y')
-        self.stream = CommandStream(RIG, *names, topics, self.law)
+        self.stream = CommandStream(RIG, self.law)
         self.now_ns, self.shafts, self.held = 1_000 * MS, REST, True
 
     @property
@@ -129,9 +120,8 @@ def test_what_the_tube_does_not_allow_is_cut_and_reported_once():
     for k in range(500):
         slave.command(0.001 * k)
     assert slave.shafts[0] == pytest.approx(0.1 * GEAR, abs=0.01)
-    names = ('bend_x', 'bend_y')
-    assert slave.stream.cut.report(ranges, names).endswith('more was asked for')
-    assert slave.stream.cut.report(ranges, names) == ''
+    assert slave.stream.cut.report(ranges).endswith('more was asked for')
+    assert slave.stream.cut.report(ranges) == ''
 
 
 def test_a_correction_is_added_and_leaves_without_a_jump():

@@ -2,7 +2,7 @@
 
 import pytest
 
-from endoscope_core.compensation import LawInForce, Selection
+from endoscope_core.compensation.law_in_force import LawInForce, Selection
 from endoscope_core.control import (
     AdoptedPlant,
     Feedforward,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from endoscope_core.control import MasterMotion
+from endoscope_core.control.master_motion import MasterMotion
 from endoscope_core.rig import shipped_rig
 from endoscope_core.safety import BendingRange
 from endoscope_core.signals.sampled_motion import SampledMotion
@@ -19,7 +19,7 @@ class Master:
 
     def __init__(self, pose=(0.0, 0.0)):
         self.pose, self.now_ns = pose, 1_000 * MS
-        self.motion = MasterMotion(RIG, 2, lambda: self.pose)
+        self.motion = MasterMotion(RIG, lambda: self.pose)
 
     def plays(self, hold=False):
         angle = np.stack([RAMP, np.full(len(RAMP), np.nan)], axis=1)
@@ -109,7 +109,7 @@ def test_it_keeps_to_the_range_of_the_tube():
     master.motion.ranges = (BendingRange(-0.6, 0.6),) * 2
     way = master.go_on(2_000)
     assert way.max() == pytest.approx(0.6, abs=0.01)
-    assert master.motion.cut.report(master.motion.ranges, ('x', 'y')).endswith('asked for')
+    assert master.motion.cut.report(master.motion.ranges).endswith('asked for')
 
 
 @pytest.mark.parametrize('hold', [False, True])

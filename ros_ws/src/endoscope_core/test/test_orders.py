@@ -6,19 +6,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from endoscope_core.calibration import CALIBRATE, HOME, OrderCode, OrderState
+from endoscope_core.calibration.order_feedback import CALIBRATE, HOME, OrderCode, OrderState
 from endoscope_core.classifier.classification import (
     ClassificationResult,
     ClassifierError,
     UnseenTensionError,
 )
 from endoscope_core.judgement import Judgement
-from endoscope_core.orders import Names, Orders, Pose
+from endoscope_core.orders import Orders, Pose
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import BRIEF, calibration_motion
 
 MS = 1_000_000
-NAMES = Names(('bend_x', 'bend_y'), ('motor_x', 'motor_y'), ('x+', 'x-', 'y+', 'y-'))
 FOUND = Judgement(ClassificationResult(70, 0.9, {70: 0.9, 80: 0.1}))
 
 
@@ -29,7 +28,6 @@ class Bench:
         self.found, self.tension = found, (5.0, 0.0, 5.0, 0.0)
         self.orders = Orders(
             rig or shipped_rig(),
-            NAMES,
             calibration_motion(BRIEF),
             self.judged,
             return_speed=1.0,
@@ -145,7 +143,7 @@ def test_a_wire_that_is_pulled_too_hard_aborts_it():
     bench.tension = (500.0, 0.0, 0.0, 0.0)
     ending = bench.go_on()
     assert ending.code is OrderCode.TENSION_CEILING
-    assert 'tension of x+ is 500.0 N' in ending.words
+    assert 'tension of wire_x_pos is 500.0 N' in ending.words
 
 
 def test_an_order_that_cannot_go_well_is_rejected_with_its_code():

@@ -1,16 +1,8 @@
 """The procedure by which the tube's hysteresis class is found."""
 
 from endoscope_core.calibration.calibration_run import (
-    CalibrationCommand,
     CalibrationRun,
     CalibrationStep,
-)
-from endoscope_core.calibration.order_feedback import (
-    CALIBRATE,
-    HOME,
-    OrderCode,
-    OrderFeedback,
-    OrderState,
 )
 from endoscope_core.calibration.records import (
     BendingRecord,
@@ -22,15 +14,9 @@ from endoscope_core.calibration.records import (
 )
 
 __all__ = [
-    'CALIBRATE',
-    'HOME',
     'BendingRecord',
-    'CalibrationCommand',
     'CalibrationRun',
     'CalibrationStep',
-    'OrderCode',
-    'OrderFeedback',
-    'OrderState',
     'TensionGapError',
     'TensionRecord',
     'with_zeros',

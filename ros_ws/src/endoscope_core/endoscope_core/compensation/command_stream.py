@@ -1,6 +1,5 @@
 """From desired bending to shaft angles: whose commands are obeyed, and what goes out."""
 
-from collections.abc import Sequence
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -15,8 +14,9 @@ from endoscope_core.control import (
     Corrections,
     DesiredMotion,
     Feedforward,
-    RangeCut,
 )
+from endoscope_core.control.range_cut import RangeCut
+from endoscope_core.names import JOINTS, MOTOR_MEASURED, MOTORS, SLAVE_COMMAND
 from endoscope_core.rig import Rig
 from endoscope_core.safety import (
     AdoptionCode,
@@ -31,6 +31,7 @@ from endoscope_core.safety import (
 # The servo has followed a command by then but for 1 %: 6 / wm of the nominal one.
 _REST_NS = 200_000_000
 _FIRST_PERIOD_S = 1e-3
+_AT_ZERO = (0.0,) * len(JOINTS)
 
 
 class Source(StrEnum):
@@ -59,13 +60,6 @@ class Measured(NamedTuple):
     tracked: tuple[int, tuple[float, ...]] | None = None
 
 
-class CommandTopics(NamedTuple):
-    """Topics that messages name."""
-
-    master: str  # of the master's commands
-    motors: str  # of what the shafts measure
-
-
 class CommandStream:
     """Turns commands into shaft angles (J,) in rad, those of one source at a time.
 
@@ -74,14 +68,7 @@ class CommandStream:
     changes: source, law or feedback. All times are local and monotonic, in ns, but for stamps.
     """
 
-    def __init__(
-        self,
-        rig: Rig,
-        joints: Sequence[str],
-        motors: Sequence[str],
-        topics: CommandTopics,
-        law: LawInForce,
-    ) -> None:
+    def __init__(self, rig: Rig, law: LawInForce) -> None:
         facts, shafts, timeout_ns = rig.joints, rig.motors, rig.timeouts.command_ns
         limits = CommandLimits(facts.reach, facts.speed, facts.entry_step, timeout_ns)
         self.gate, self.calibration_gate = CommandGate(limits), CommandGate(limits)
@@ -89,19 +76,17 @@ class CommandStream:
             CommandLimits(facts.correction, shafts.speed / facts.gear, facts.correction, timeout_ns)
         )
         most = (facts.drive * facts.gear, shafts.speed, shafts.acceleration, shafts.step)
-        self.shaper = MotionShaper(MotionLimits.either_way(len(motors), *most))
+        self.shaper = MotionShaper(MotionLimits.either_way(len(MOTORS), *most))
         self.source = Source.NOBODY
         self.corrected = False  # whether a correction is added
         self.cut = RangeCut()
-        self._joints, self._topics, self._law = tuple(joints), topics, law
-        self._gear, self._resolution = facts.gear, shafts.resolution
-        self._passing = Feedforward(len(joints), law.feedforward.settings)
-        self._desired = DesiredMotion(len(joints))
+        self._law, self._gear, self._resolution = law, facts.gear, shafts.resolution
+        self._passing = Feedforward(len(JOINTS), law.feedforward.settings)
+        self._desired = DesiredMotion(len(JOINTS))
         self._corrections = Corrections(timeout_ns)
-        self._answer = StandingStill(motors, shafts.resolution)
+        self._answer = StandingStill(MOTORS, shafts.resolution)
         self._learnt_ns = self._stamp_ns = self._moved_ns = 0
-        self._none = (0.0,) * len(joints)
-        self._sent = self._rested_at = self._angle = self._none
+        self._sent = self._rested_at = self._angle = _AT_ZERO
 
     def restart(self) -> None:
         """Forget all streams, as when a motion session begins or ends."""
@@ -119,7 +104,7 @@ class CommandStream:
     def correct(self, correction: Command, now_ns: int) -> None:
         """Take a correction, to be added to the master's commands after it."""
         stamp_ns, position, _ = correction
-        if self.correction_gate.check(stamp_ns, position, now_ns, self._none) is None:
+        if self.correction_gate.check(stamp_ns, position, now_ns, _AT_ZERO) is None:
             self._corrections.add(stamp_ns, position)
 
     def follow(
@@ -142,7 +127,7 @@ class CommandStream:
         # This mode learns from the tracker itself.
         learns = feedforward.law.mode == ADAPTIVE_PHYSICAL
         correction = None if learns else self._corrections.before(command.stamp_ns)
-        added = np.zeros(len(self._joints)) if correction is None else correction
+        added = np.zeros(len(JOINTS)) if correction is None else correction
         if begins:
             self._desired.restart()
         if begins or self.corrected != (correction is not None):
@@ -169,7 +154,7 @@ class CommandStream:
         seconds, begins = step
         if begins:
             self._passing.rebase(self._drive_before(), command.position)
-        drive = self._passing.step(command.position, command.velocity or self._none, seconds)
+        drive = self._passing.step(command.position, command.velocity or _AT_ZERO, seconds)
         return self._put_out(drive, seconds, now_ns)
 
     def watch(self, now_ns: int, measured: Measured, held: bool) -> str:
@@ -179,7 +164,7 @@ class CommandStream:
             self.source = Source.NOBODY
             if held:
                 refused = f' ({self.gate.last_reason})' if self.gate.last_reason else ''
-                reason = f'{self._topics.master} ended while the clutch was held{refused}'
+                reason = f'{SLAVE_COMMAND} ended while the clutch was held{refused}'
         elif self.source is Source.CALIBRATION and not self.calibration_gate.is_fresh(now_ns):
             self.source = Source.NOBODY
         if self.source is Source.NOBODY:
@@ -197,11 +182,11 @@ class CommandStream:
             )
         if measured.bending is None:
             raise AdoptionError(
-                AdoptionCode.NOT_MEASURED, f'{self._topics.motors} is silent: no pose is known'
+                AdoptionCode.NOT_MEASURED, f'{MOTOR_MEASURED} is silent: no pose is known'
             )
         if plant is not None:
             before = self._angle if self.source is Source.MASTER else measured.bending
-            plant.check_within(before, self._joints)
+            plant.check_within(before, JOINTS)
 
     def _obey(
         self,

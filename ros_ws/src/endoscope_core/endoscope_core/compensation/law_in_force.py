@@ -7,6 +7,7 @@ from endoscope_core.choices import BY_ADOPTED, BY_CLASS
 from endoscope_core.control import AdoptedPlant, Feedforward, FeedforwardLaw
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.identification.law_choice import CalibrationFindings, LawChoice
+from endoscope_core.names import JOINTS
 from endoscope_core.safety import BendingRange
 
 _ANY_CLASS = CalibrationFindings(class_deg=70)
@@ -106,6 +107,23 @@ class LawInForce:
         """Go back to the plant from before what was set for the session that has ended."""
         while self._before and self._before[-1].for_session:
             self.undo()
+
+    def figures(self, lead: float, gear: float) -> dict[str, object]:
+        """What is in force and what is selected, with the `lead` in s and the rig's `gear`."""
+        mode, selected_by = self.selection
+        law = self.feedforward.law
+        values: dict[str, object] = {
+            'mode': law.mode,
+            'wanted_mode': mode,
+            'selected_by': selected_by,
+            'lead': lead,
+            'gear': gear,
+        }
+        if self.findings is not None and self.findings.class_deg is not None:
+            values['class_deg'] = self.findings.class_deg
+        for joint, parameters in zip(JOINTS, law.parameters, strict=False):
+            values |= {f'{joint}.{key}': value for key, value in parameters.to_dict().items()}
+        return values
 
     def in_words(self, remedy: str) -> str:
         """What is compensated by, or why nothing is; `remedy` is how to calibrate."""

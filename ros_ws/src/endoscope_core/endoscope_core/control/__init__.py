@@ -14,10 +14,8 @@ from endoscope_core.control.feedforward import Feedforward, FeedforwardLaw, Feed
 from endoscope_core.control.handle import Handle, HandleRefusal, HandleSettings
 from endoscope_core.control.internal_model import PhysicalParameters, bending_range
 from endoscope_core.control.limits import MotorLimits
-from endoscope_core.control.master_motion import MasterMotion, PlayedMotion
 from endoscope_core.control.physical_inverse import PhysicalInverse
 from endoscope_core.control.plant_learning import PlantLearning
-from endoscope_core.control.range_cut import RangeCut
 from endoscope_core.control.tracker_feedback import AdaptiveBacklashController, TrackerMeasurement
 
 __all__ = [
@@ -35,13 +33,10 @@ __all__ = [
     'Handle',
     'HandleRefusal',
     'HandleSettings',
-    'MasterMotion',
     'MotorLimits',
     'PhysicalInverse',
     'PhysicalParameters',
     'PlantLearning',
-    'PlayedMotion',
-    'RangeCut',
     'TrackerMeasurement',
     'adopted_plant',
     'bending_range',

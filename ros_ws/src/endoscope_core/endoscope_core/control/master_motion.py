@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from endoscope_core.control.handle import Handle, HandleSettings
 from endoscope_core.control.range_cut import RangeCut
+from endoscope_core.names import JOINTS
 from endoscope_core.rig import Rig
 from endoscope_core.safety import BendingRange, MotionLimits, MotionShaper
 from endoscope_core.safety.motion_session import STALL_NS
@@ -137,11 +138,11 @@ class MasterMotion:
     `bending` gives the measured pose (J,) in rad, or None. Times are local and monotonic, in ns.
     """
 
-    def __init__(self, rig: Rig, joints: int, bending: Callable[[], Angles | None]) -> None:
+    def __init__(self, rig: Rig, bending: Callable[[], Angles | None]) -> None:
         facts = rig.joints
         self._limits, self._hand_limits = (
             MotionLimits.either_way(
-                joints, facts.reach, speed, facts.acceleration, facts.entry_step
+                len(JOINTS), facts.reach, speed, facts.acceleration, facts.entry_step
             )
             for speed in (facts.speed, facts.hand_speed)
         )

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from endoscope_core.names import JOINTS
 from endoscope_core.safety import BendingRange, keep_within, ranges_in_words
 
 
@@ -20,9 +21,9 @@ class RangeCut:
         self.count += kept[0] != tuple(angle)
         return kept
 
-    def report(self, ranges: Sequence[BendingRange], joints: Sequence[str]) -> str:
+    def report(self, ranges: Sequence[BendingRange]) -> str:
         """In words that something was cut since the last report; empty if nothing was."""
         before, self._reported = self._reported, self.count
         if before == self.count:
             return ''
-        return f'{ranges_in_words(ranges, joints)}, more was asked for'
+        return f'{ranges_in_words(ranges, JOINTS)}, more was asked for'

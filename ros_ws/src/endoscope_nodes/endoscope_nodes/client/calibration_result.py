@@ -69,8 +69,8 @@ def successful_result(
             tube = bending_range(plant.joint, limits)
             values |= {f'{REACH}{joint}.low': tube.low, f'{REACH}{joint}.high': tube.high}
     message = f'class {verdict.class_deg} deg with probability {verdict.probability:.3f}'
-    message += found.lost_in_words(JOINTS)
-    return _message(stamp_ns, OK, with_zeros(message, zeros, WIRES), values)
+    message += found.lost_in_words()
+    return _message(stamp_ns, OK, with_zeros(message, zeros), values)
 
 
 def aborted_result(stamp_ns: int, reason: str, step: str, duration: float) -> DiagnosticArray:
@@ -94,7 +94,7 @@ def refused_result(
         'duration': duration,
         **_zero_values(zeros),
     }
-    return _message(stamp_ns, ERROR, with_zeros(reason, zeros, WIRES), values)
+    return _message(stamp_ns, ERROR, with_zeros(reason, zeros), values)
 
 
 def _zero_values(zeros: 'NDArray[np.float64] | None') -> dict[str, object]:

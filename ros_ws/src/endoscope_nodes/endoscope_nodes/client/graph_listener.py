@@ -12,7 +12,7 @@ from rclpy.serialization import deserialize_message
 from rclpy.time import Time
 from std_msgs.msg import Header, String
 
-from endoscope_core.calibration import OrderFeedback, OrderState
+from endoscope_core.calibration.order_feedback import OrderFeedback, OrderState
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.exit_status import ClosedOnExit
 from endoscope_nodes import names

@@ -4,7 +4,7 @@ from dataclasses import asdict
 
 from diagnostic_msgs.msg import DiagnosticArray
 
-from endoscope_core.calibration import OrderCode, OrderFeedback, OrderState
+from endoscope_core.calibration.order_feedback import OrderCode, OrderFeedback, OrderState
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, diagnostic_array, status
 
 

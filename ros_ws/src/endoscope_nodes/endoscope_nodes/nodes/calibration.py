@@ -10,7 +10,13 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from threadpoolctl import threadpool_limits
 
-from endoscope_core.calibration import CALIBRATE, HOME, OrderCode, OrderFeedback, OrderState
+from endoscope_core.calibration.order_feedback import (
+    CALIBRATE,
+    HOME,
+    OrderCode,
+    OrderFeedback,
+    OrderState,
+)
 from endoscope_core.classifier.classification import (
     Classifier,
     ClassifierError,
@@ -19,7 +25,7 @@ from endoscope_core.classifier.classification import (
 from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_core.control import MotorLimits
 from endoscope_core.judgement import Judgement, judged
-from endoscope_core.orders import Ending, Names, Order, Orders, Pose
+from endoscope_core.orders import Ending, Order, Orders, Pose
 from endoscope_core.safety import StateCommand
 from endoscope_core.signals import CalibrationMotion, calibration_motion
 from endoscope_nodes import names
@@ -65,7 +71,6 @@ class CalibrationNode(EndoscopeNode):
 
         self.orders = Orders(
             self.rig,
-            Names(names.JOINTS, names.MOTORS, names.WIRES),
             motion,
             judge,
             return_speed=p.return_speed,

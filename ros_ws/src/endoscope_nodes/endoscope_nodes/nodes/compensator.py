@@ -3,21 +3,14 @@
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.parameter import Parameter
 
-from endoscope_core.compensation import (
-    Command,
-    CommandStream,
-    CommandTopics,
-    LawInForce,
-    Measured,
-    Selection,
-)
+from endoscope_core.compensation.command_stream import Command, CommandStream, Measured
+from endoscope_core.compensation.law_in_force import LawInForce, Selection
 from endoscope_core.control import AdoptedPlant, Feedforward, FeedforwardSettings, MotorLimits
 from endoscope_core.identification.law_choice import LawChoice
 from endoscope_nodes import names
 from endoscope_nodes.client.calibration_result import findings_of, is_of_no_class
-from endoscope_nodes.client.compensator_state import compensator_state
 from endoscope_nodes.nodes.plant_adoption import PlantAdoption
-from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report
+from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report, diagnostic_array, status
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
 from endoscope_nodes.runtime.node_parameters import FOR_SESSION, CompensatorParameters
@@ -45,9 +38,8 @@ class CompensatorNode(EndoscopeNode):
             LawChoice(joints, p.parameter_sets, p.table),
             Selection(p.mode, p.selected_by),
         )
-        topics = CommandTopics(names.SLAVE_COMMAND, names.MOTOR_MEASURED)
-        stream = CommandStream(self.rig, names.JOINTS, names.MOTORS, topics, self.law)
-        self.stream, self._calibrated_in = stream, ''
+        self.stream, self._calibrated_in = CommandStream(self.rig, self.law), ''
+        stream = self.stream
         self._motors = JointPublisher(
             self, names.MOTOR_COMMAND, names.MOTORS, ('position',), COMMAND
         )
@@ -144,11 +136,11 @@ class CompensatorNode(EndoscopeNode):
         now, law = self.ticker.now_ns(), self.law
         if now and law.changed:
             law.changed = False
-            in_force, gear = law.feedforward.law, self.rig.joints.gear
-            words = law.in_words(self.operate('calibrate'))
-            self._states.publish(
-                compensator_state(now, in_force, self._settings, gear, law.findings, words)
+            values = law.figures(self._settings.lead, self.rig.joints.gear)
+            model = status(
+                'compensator: model', OK, law.in_words(self.operate('calibrate')), values
             )
+            self._states.publish(diagnostic_array(now, model))
 
     def close(self) -> None:
         """Let the thread end in which plants are tried."""
@@ -159,7 +151,7 @@ class CompensatorNode(EndoscopeNode):
         waiting = self._settings.mode != 'none' and not law.is_known
         level = ERROR if law.error else WARN if waiting else OK
         words = law.in_words(self.operate('calibrate'))
-        cut = stream.cut.report(law.ranges, names.JOINTS)
+        cut = stream.cut.report(law.ranges)
         if cut:
             level, words = max(level, WARN), f'{words}; {cut}'
         learnt = (f'{each.joint.capstan_exponent:.3f}' for each in law.feedforward.learnt)

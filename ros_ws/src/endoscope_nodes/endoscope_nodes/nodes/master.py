@@ -7,7 +7,8 @@ from rclpy.publisher import Publisher
 from sensor_msgs.msg import Joy
 
 from endoscope_core.choices import FOLLOW_THE_HANDLE
-from endoscope_core.control import HandleRefusal, MasterMotion, PlayedMotion
+from endoscope_core.control import HandleRefusal
+from endoscope_core.control.master_motion import MasterMotion, PlayedMotion
 from endoscope_core.errors import FileError
 from endoscope_core.signals.sampled_motion import SampledMotion, load_command_file, sample_motion
 from endoscope_nodes import names
@@ -47,7 +48,7 @@ class MasterNode(EndoscopeNode):
         self._clutch_out: Publisher | None = None
         self._session = SessionWatch(self, self._rest, self._rest)
         self._pose = context.pose_of(self)
-        self.motion = MasterMotion(self.rig, len(names.JOINTS), self._pose.bending)
+        self.motion = MasterMotion(self.rig, self._pose.bending)
         self._calibration = StreamWatch.of(self, names.CALIBRATION_COMMAND, COMMAND)
         handle = self.motion.handle
         self._session.one_sender(
@@ -190,7 +191,7 @@ class MasterNode(EndoscopeNode):
         if unheeded and not self._warned:
             self._warned = True
             self.get_logger().warning(unheeded)
-        cut = '' if unheeded else motion.cut.report(motion.ranges, names.JOINTS)
+        cut = '' if unheeded else motion.cut.report(motion.ranges)
         if unheeded or cut:
             return WARN, unheeded or cut, values
         if played is not None:

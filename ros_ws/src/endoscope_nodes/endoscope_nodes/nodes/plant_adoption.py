@@ -6,9 +6,9 @@ from concurrent.futures import Future
 
 from diagnostic_msgs.msg import DiagnosticArray
 
-from endoscope_core.calibration import OrderState
+from endoscope_core.calibration.order_feedback import OrderState
 from endoscope_core.choices import BY_ADOPTED, PHYSICAL
-from endoscope_core.compensation import LawInForce, Selection
+from endoscope_core.compensation.law_in_force import LawInForce, Selection
 from endoscope_core.control import AdoptedPlant, AdoptionError, adopted_plant
 from endoscope_core.safety import AdoptionCode
 from endoscope_nodes import names

@@ -131,8 +131,32 @@ class SessionWatch:
         take: Callable[[JointSample], None],
         obeys: bool = False,
     ) -> None:
-        """Give `take` the commands of joints on a topic; see :class:`CommandInput`."""
-        CommandInput(self._node, self, topic, gate, take)
+        """Give `take` the commands of joints of the open session, while they have one sender.
+
+        With `obeys`, see there, too.
+        """
+
+        def receive(sample: JointSample) -> None:
+            if not self.belongs(sample.session):
+                gate.refuse(Refusal.SESSION, sample.session or 'none named')
+                return
+            competing = senders.rivals()
+            if competing:
+                gate.refuse(Refusal.SENDER, competing)
+                self.leave(competing)
+                return
+            take(sample)
+
+        stream = JointSubscription(
+            self._node,
+            topic,
+            JOINTS,
+            receive,
+            COMMAND,
+            exact=True,
+            on_malformed=lambda reason: gate.refuse(Refusal.MALFORMED, reason),
+        )
+        senders = self.senders_of(stream.subscription)
         if obeys:
             self.obeys(topic, gate)
 
@@ -195,43 +219,6 @@ class SessionWatch:
     def _report(self) -> Report:
         session = self._session
         return (ERROR, session.trouble, {}) if session.trouble else (OK, session.name or 'none', {})
-
-
-class CommandInput:
-    """Commands of joints on a topic; `take` gets those of the open session from its one sender."""
-
-    def __init__(
-        self,
-        node: EndoscopeNode,
-        session: SessionWatch,
-        topic: str,
-        gate: CommandGate,
-        take: Callable[[JointSample], None],
-    ) -> None:
-        self._session = session
-        self._gate = gate
-        self._take = take
-        stream = JointSubscription(
-            node,
-            topic,
-            JOINTS,
-            self._receive,
-            COMMAND,
-            exact=True,
-            on_malformed=lambda reason: gate.refuse(Refusal.MALFORMED, reason),
-        )
-        self._senders = session.senders_of(stream.subscription)
-
-    def _receive(self, sample: JointSample) -> None:
-        if not self._session.belongs(sample.session):
-            self._gate.refuse(Refusal.SESSION, sample.session or 'none named')
-            return
-        rivals = self._senders.rivals()
-        if rivals:
-            self._gate.refuse(Refusal.SENDER, rivals)
-            self._session.leave(rivals)
-            return
-        self._take(sample)
 
 
 class ClutchWatch:
