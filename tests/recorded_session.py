@@ -61,7 +61,7 @@ class RecordedSession(ProbedRuntime):
         """Wait until so many messages of topics are recorded, or more."""
 
         def recorded() -> bool:
-            found = self.recorder._session.report().counts
+            found = self.recorder.bags.session.report().counts
             return all(found[topic] >= count for topic, count in counts.items())
 
         self.wait(recorded)

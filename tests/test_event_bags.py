@@ -55,7 +55,7 @@ class WatchedSession(RecordedSession):
 
     def say(self, state):
         self.state.publish(String(data=state))
-        self.wait(lambda: self.recorder._events.state == state)
+        self.wait(lambda: self.recorder.bags.events.state == state)
 
     def fault(self, cause=CAUSE):
         self.say('ENABLED')
@@ -67,12 +67,12 @@ class WatchedSession(RecordedSession):
             self.health.publish(DiagnosticArray(status=[status]))
 
     def kept(self):
-        self.wait(lambda: self.recorder._events.events)
-        self.wait(lambda: not self.recorder._events.events)
+        self.wait(lambda: self.recorder.bags.events.events)
+        self.wait(lambda: not self.recorder.bags.events.events)
         return event_bags(self.folder)
 
     def said(self):
-        level, message, _ = self.recorder._events.report()
+        level, message, _ = self.recorder._report_events()
         return level, message
 
 
@@ -110,9 +110,9 @@ def test_two_faults_within_two_seconds_have_a_bag_each_and_a_mark_is_noted_in_on
         session.session.publish(Header(frame_id='session-17'))
         session.serve(1.0)
         session.fault()
-        session.wait(lambda: session.recorder._events.events[0].session)
+        session.wait(lambda: session.recorder.bags.events.events[0].session)
         session.fault(second)
-        session.wait(lambda: len(session.recorder._events.events) == 2)
+        session.wait(lambda: len(session.recorder.bags.events.events) == 2)
         # A third one is noted beside the second: no more than two are written at a time.
         session.fault(second)
         session.marks.publish(String(data='  the wire has slipped '))
@@ -147,7 +147,7 @@ def test_a_node_that_ends_finishes_what_it_writes(tmp_path):
     with WatchedSession(tmp_path) as session:
         session.serve(0.5)
         session.marks.publish(String())
-        session.wait(lambda: session.recorder._events.events)
+        session.wait(lambda: session.recorder.bags.events.events)
     [path] = event_bags(tmp_path)
     bag = open_bag(path)
     assert [(e.kind, e.reason) for e in events_of(bag.metadata)] == [('mark', 'by the operator')]

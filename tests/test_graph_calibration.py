@@ -56,7 +56,7 @@ def test_finds_the_class_of_a_known_tube_from_anywhere(tmp_path, size_deg, seed,
         low, high = float(values['regressed_size_low']), float(values['regressed_size_high'])
         assert low < float(values['regressed_size']) < high
         assert math.degrees(float(values['regressed_size'])) == pytest.approx(size_deg, abs=3.0)
-        state = graph.nodes['compensator']
+        state = graph.nodes['compensator'].law
         assert state.findings.class_deg == size_deg
         if motion != 'brief':
             return
@@ -73,7 +73,7 @@ def test_tensions_of_no_known_tube_are_refused_and_nothing_is_compensated(tmp_pa
     overrides = slave_of(PlantDescription(effects=(slack,)), tmp_path / 'slack.yaml')
     overrides['calibration'] = {'motion': 'brief'}
     with SimulatedGraph(overrides=overrides) as graph:
-        graph.nodes['compensator'].findings = CalibrationFindings(60)
+        graph.nodes['compensator'].law.findings = CalibrationFindings(60)
         graph.enable()
         assert graph.call_calibration().success
         graph.advance(5.0)
@@ -82,7 +82,7 @@ def test_tensions_of_no_known_tube_are_refused_and_nothing_is_compensated(tmp_pa
         values = {v.key: v.value for v in status.values}
         assert values['class_deg'] == 'none'
         assert values['reason'].startswith('none of the classes: the tensions')
-        assert graph.nodes['compensator'].findings is None
+        assert graph.nodes['compensator'].law.findings is None
         assert graph.states[-1] == 'ENABLED'
 
 
@@ -142,7 +142,7 @@ def test_stale_load_cells_abort_and_the_slave_stands_still():
         positions = np.array([s.position for s in shafts])
         assert np.ptp(positions[-TICK_RATE // 2 :], axis=0).max() < 0.003
         assert graph.states[-1] == 'FAULT'
-        assert graph.nodes['compensator'].findings is None
+        assert graph.nodes['compensator'].law.findings is None
 
 
 def test_over_tension_aborts_and_is_a_fault():

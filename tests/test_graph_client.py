@@ -1,5 +1,7 @@
 """Whoever asks the graph for something is told what came of that, and of nothing else."""
 
+import dataclasses
+
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from simulated_graph import SimulatedGraph
@@ -61,7 +63,7 @@ def calibrate(graph, happens):
 def test_one_that_ends_in_the_instant_in_which_it_began_is_told(graph):
     def lose_the_session():
         calibration = graph.nodes['calibration']
-        assert calibration.ticker.now_ns() == calibration._began_ns
+        assert calibration.ticker.now_ns() == calibration.orders.order.began_ns
         calibration._session.leave('the test ends it')
 
     with pytest.raises(GraphError, match=ABORTED):
@@ -88,9 +90,11 @@ def go_home(graph, happens):
 
 
 def test_an_order_is_known_by_codes_whatever_is_said_of_it(graph, monkeypatch):
-    calibration = graph.nodes['calibration']
-    tell = calibration._tell
-    monkeypatch.setattr(calibration, '_tell', lambda last, code='': tell(f'so: {last}', code))
+    orders = graph.nodes['calibration'].orders
+    end = orders._end
+    monkeypatch.setattr(
+        orders, '_end', lambda e: end(e and dataclasses.replace(e, words=f'so: {e.words}'))
+    )
     assert go_home(graph, lambda: None).startswith('so: home reached')
     # The one before, which ended well, is latched.
     with pytest.raises(GraphError, match=r'so: aborted while .*: the motion session has'):

@@ -71,8 +71,8 @@ def test_every_mode_comes_in_while_moving_without_a_jump(tmp_path):
         graph.enable()
         graph.calibrate()
         node = graph.nodes['compensator']
-        assert node._feedforward._compiled == {'bouc_wen'}
-        assert len(node.findings.plants) == 2
+        assert node.law.feedforward._compiled == {'bouc_wen'}
+        assert len(node.law.findings.plants) == 2
         graph.set('master', source='motion')
         graph.advance(2.0)
         for mode in (*MODES[1:], 'none', 'bouc_wen'):
@@ -81,8 +81,8 @@ def test_every_mode_comes_in_while_moving_without_a_jump(tmp_path):
             drives.clear()
             graph.set('compensator', mode=mode)
             graph.advance(0.02)
-            assert node._feedforward.law.mode == mode
-            assert mode in node._feedforward._compiled
+            assert node.law.feedforward.law.mode == mode
+            assert mode in node.law.feedforward._compiled
             steps = np.abs(np.diff([s.position for s in drives], axis=0))
             assert len(drives) >= 0.02 * TICK_RATE
             # 20 rad/s at the joint is what the feed-forward allows itself; a jump would be 0.1 rad.
@@ -102,7 +102,7 @@ def test_every_mode_comes_in_while_moving_without_a_jump(tmp_path):
         # What a calibration did not find is not guessed.
         graph.set('master', source='none')
         compensator = graph.nodes['compensator']
-        compensator.findings = CalibrationFindings(70)
+        compensator.law.findings = CalibrationFindings(70)
         graph.set('compensator', mode='physical', selected_by='plant')
         graph.advance(0.6)
-        assert compensator._feedforward.law.mode == 'none'
+        assert compensator.law.feedforward.law.mode == 'none'

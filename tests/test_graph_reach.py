@@ -74,7 +74,7 @@ def test_the_compensator_cuts_what_a_master_asks_for_beyond_it():
     with SimulatedGraph(overrides=overrides) as graph:
         gear = graph.nodes['compensator'].rig.joints.gear
         graph.enable()
-        graph.nodes['compensator'].findings = CalibrationFindings(
+        graph.nodes['compensator'].law.findings = CalibrationFindings(
             ranges=(BendingRange(-0.2, 0.3),) * 2
         )
         asked, drives = graph.listen(SLAVE_COMMAND), graph.listen(MOTOR_COMMAND, MOTORS)
@@ -111,7 +111,7 @@ def test_nothing_that_a_calibration_commands_leads_beyond_the_reach():
             sender.send([0.5 * k / TICK_RATE, 0.0], velocity=[0.5, 0.0])
             graph.advance(1.0 / TICK_RATE)
         assert max(goal.position[0] for goal in goals) == pytest.approx(0.3 * gear, abs=2e-3)
-        assert compensator.calibration_gate.last_reason.endswith('rad beyond 0.3')
+        assert compensator.stream.calibration_gate.last_reason.endswith('rad beyond 0.3')
 
 
 def test_home_leads_back_from_shafts_beyond_the_reach():
@@ -121,7 +121,7 @@ def test_home_leads_back_from_shafts_beyond_the_reach():
     ) as graph:
         compensator, gear = graph.nodes['compensator'], shipped_rig().joints.gear
         graph.enable()
-        compensator.findings = CalibrationFindings(class_deg=100)
+        compensator.law.findings = CalibrationFindings(class_deg=100)
         graph.set('compensator', mode='dahl')
         graph.set('master', source='motion')
         graph.advance(2.0)
@@ -136,4 +136,4 @@ def test_home_leads_back_from_shafts_beyond_the_reach():
         assert graph.reported('calibration: procedure')['last'].startswith('home reached')
         turned = np.abs([sample.position for sample in shafts])
         assert turned.max() < turned[0].max() + 0.01
-        assert sum(compensator.calibration_gate.refused.values()) == 0
+        assert sum(compensator.stream.calibration_gate.refused.values()) == 0

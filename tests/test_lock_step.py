@@ -166,10 +166,10 @@ def test_a_hand_that_falls_silent_in_slow_time_is_let_go_of_by_the_wall():
         graph.enable()
         console = graph.nodes['master']
         hand = Handle(graph)
-        while not console._handle.engaged:
+        while not console.motion.handle.engaged:
             hand.move(0.1, (0.2, 0.0))
         # 160 ms of a person's time, of which the slave has seen 80.
         hand.move(0.08, alive=False)
-        assert not console._handle.engaged
-        while not console._handle.engaged:
+        assert not console.motion.handle.engaged
+        while not console.motion.handle.engaged:
             hand.move(0.1, (0.2, 0.0))

@@ -105,7 +105,7 @@ BAD = (
 
 
 def test_a_bad_command_is_refused_counted_and_changes_nothing(foreign, master):
-    gate = foreign.nodes['compensator'].gate
+    gate = foreign.nodes['compensator'].stream.gate
     moved = Moved(foreign)
     for changes, reason in BAD:
         # Not as far as the joints reach, all in all.
@@ -139,7 +139,7 @@ def test_a_step_is_refused_and_ends_the_session(foreign, master):
     for _ in range(ticks(0.6)):
         master.tick([1.4 * master.towards] * 2)
     assert foreign.state == 'FAULT'
-    assert foreign.nodes['compensator'].gate.refused['too fast']
+    assert foreign.nodes['compensator'].stream.gate.refused['too fast']
     assert 'slave/servo_jp ended while the clutch was held (too far' in foreign.cause
     assert moved.largest_step < BOUND
     assert moved.of_shafts < 0.05
@@ -171,7 +171,7 @@ def test_a_velocity_that_belies_the_positions_moves_nothing(foreign, master):
 
 
 def test_nothing_moves_unless_enabled_and_while_the_clutch_is_held(foreign, master):
-    moved, refused = Moved(foreign), foreign.nodes['compensator'].gate.refused
+    moved, refused = Moved(foreign), foreign.nodes['compensator'].stream.gate.refused
     master.move(0.04)
     master.clutch = None
     master.move(1.2)

@@ -22,7 +22,7 @@ from std_msgs.msg import String
 from endoscope_bags import open_bag
 from endoscope_bags.cdr_encoding import encode_clock, encode_joint_state, encode_string
 from endoscope_bags.message_types import message_type
-from endoscope_nodes.nodes.recorder import new_bag
+from endoscope_bags.recorder import new_bag
 from endoscope_nodes.runtime.diagnostics import OK
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import EVENT, LOCK_STEP, RESULT, SENSOR_ASKED, SENSOR_OFFERED

@@ -58,7 +58,7 @@ def test_servos_that_are_emulated_say_so(tmp_path):
     with MotorRig(tmp_path, domain=private_domain()) as rig:
         assert rig.wait(lambda: bool(rig.shafts))
         recorder = rig.node('recorder')
-        assert rig.wait(lambda: recorder._session.report().counts['/endoscope/rig/kind'])
+        assert rig.wait(lambda: recorder.bags.session.report().counts['/endoscope/rig/kind'])
     emulated = kind_of_bag(open_bag(rig.bag))
     assert (emulated.kind, emulated.plant) == (Kind.EMULATED, '')
 

@@ -111,7 +111,7 @@ def test_a_command_that_outlives_its_sender_is_not_obeyed(foreign, master, topic
     node = foreign.nodes[reader]
     gates = {
         'motor_driver': lambda: node.motion.gate,
-        'compensator': lambda: node.gate,
+        'compensator': lambda: node.stream.gate,
         'controller': lambda: node._gate,
     }
     gate = gates[reader]()
@@ -176,13 +176,13 @@ def test_a_handle_that_outlives_its_sender_is_not_followed(foreign):
     handle.move(0.2, clutch=False)
     master = foreign.nodes['master']
     taken = []
-    take = master._handle.take
-    master._handle.take = lambda *sample: (taken.append(sample[1]), take(*sample))[1]
+    take = master.motion.handle.take
+    master.motion.handle.take = lambda *sample: (taken.append(sample[1]), take(*sample))[1]
     message = JointState(name=list(JOINTS), position=[0.9, 0.9])
     message.header.stamp = Time(nanoseconds=foreign.clock.now_ns + 1_000_000).to_msg()
     leave_behind(foreign, master, MASTER_MEASURED, message, SENSOR_OFFERED)
     handle.move(0.1, clutch=False)
-    del master._handle.take
+    del master.motion.handle.take
     foreign.probe.destroy_publisher(handle.publisher)
     foreign.probe.destroy_publisher(handle.clutch_publisher)
     assert taken
@@ -207,7 +207,10 @@ def test_a_result_that_outlives_its_sender_is_not_taken(reader):
         ]
         leave_behind(graph, graph.nodes[reader], CALIBRATION_RESULT, result, RESULT)
         graph.advance(0.5)
-        taken = {'compensator': compensator._found, 'master': master._ranges}
+        taken = {
+            'compensator': compensator.law.pending or compensator.law.findings,
+            'master': master.motion.ranges,
+        }
         assert not taken[reader]
         assert graph.state == 'FAULT'
         assert CALIBRATION_RESULT in graph.cause
@@ -287,12 +290,12 @@ def test_a_calibration_node_started_anew_is_believed_after_another_enable():
         graph.calibrate()
         graph.advance(0.1)
         assert graph.state == 'ENABLED'
-        assert graph.nodes['compensator'].findings is not None
-        assert graph.nodes['master']._ranges
+        assert graph.nodes['compensator'].law.findings is not None
+        assert graph.nodes['master'].motion.ranges
         graph.kill('compensator')
         graph.advance(0.02)
         graph.start('compensator')
         graph.advance(0.3)
         graph.enable()
         graph.advance(0.5)
-        assert graph.nodes['compensator'].findings is None
+        assert graph.nodes['compensator'].law.findings is None

@@ -145,14 +145,14 @@ def test_home_goes_on_while_its_key_is_held_and_is_paused_otherwise(graph):
         typist.shows('PAUSED')
         assert not graph.nodes['calibration'].active
         assert typist.stands()
-        homed = graph.nodes['calibration']
+        homed = graph.nodes['calibration'].orders
         # A key that a busy machine repeats too late is a key let go, and pauses once more.
-        while not homed._last.startswith('home reached'):
+        while not homed.last.startswith('home reached'):
             typist.type(b'e')
             typist.shows('ENABLED')
             typist.hold(
                 H,
-                until=lambda: homed._last.startswith('home reached') or graph.state == 'PAUSED',
+                until=lambda: homed.last.startswith('home reached') or graph.state == 'PAUSED',
                 longest_s=120.0,
             )
         typist.shows('OPEN')

@@ -20,7 +20,11 @@ from endoscope_core.identification.plant_fit import (
     plants_of_calibration,
     size_of_explained,
 )
+from endoscope_core.names import JOINTS
 from endoscope_core.signals import CALIBRATION_RATE, CalibrationMotion
+
+# Less is no tenth of a newton in words.
+_WORTH_TELLING_N = 0.05
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,18 @@ class Judgement:
     plants: tuple[PhysicalParameters, ...] = ()  # of each joint; empty where not identified
     # What each joint's wires have lost of their pretension in N, where the plant named the class.
     lost: list[float] | None = None
+
+    def lost_in_words(self) -> str:
+        """That the plant named the class, and what wires have lost; empty where it did not."""
+        if self.lost is None:
+            return ''
+        losses = [
+            f'{joint} {x:.1f} N'
+            for joint, x in zip(JOINTS, self.lost, strict=True)
+            if x >= _WORTH_TELLING_N
+        ]
+        lost = f'; the wires have lost pretension ({", ".join(losses)}): tighten them'
+        return ', by the plant: the classifier knows no such tensions' + (lost if losses else '')
 
 
 def judged(

@@ -1,8 +1,6 @@
 """Names of joints, motors, wires, topics and services, as other people's programs rely on them."""
 
-JOINTS = ('bend_x', 'bend_y')
-MOTORS = ('motor_x', 'motor_y')
-WIRES = ('wire_x_pos', 'wire_x_neg', 'wire_y_pos', 'wire_y_neg')
+from endoscope_core.names import JOINTS, MOTOR_MEASURED, MOTORS, SLAVE_COMMAND, WIRES  # noqa: F401
 
 # Node names of the master and of the simulation clock, by which their parameters, permissions and
 # diagnostics go. All other nodes are named as their modules.
@@ -11,7 +9,6 @@ CLOCK_NODE = 'simulation_clock'
 
 MASTER_MEASURED = 'master/measured_js'
 MASTER_CLUTCH = 'master/clutch'
-SLAVE_COMMAND = 'slave/servo_jp'
 SLAVE_MEASURED = 'slave/measured_js'
 CALIBRATION_COMMAND = 'calibration/servo_jp'
 CALIBRATION_RESULT = 'calibration/result'
@@ -23,7 +20,6 @@ COMPENSATOR_PLANT = 'compensator/plant'
 COMPENSATOR_ADOPT = 'compensator/adopt'
 MOTOR_COMMAND = 'motor/servo_jp'
 MOTOR_SETPOINT = 'motor/setpoint_js'
-MOTOR_MEASURED = 'motor/measured_js'
 WIRES_MEASURED = 'wires/measured_js'
 TRACKER_POSE = 'tracker/measured_cp'
 OPERATING_STATE = 'slave/operating_state'

@@ -36,7 +36,8 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_nodes.runtime.stop_signals import end_when_asked
 
     end_when_asked('endoscope')
-    from endoscope_nodes.nodes.recorder import RecorderNode, new_bag
+    from endoscope_bags.recorder import new_bag
+    from endoscope_nodes.nodes.recorder import RecorderNode
     from endoscope_nodes.runtime.runtime import run_nodes
 
     # The bags of faults are written by the recorder of the graph.

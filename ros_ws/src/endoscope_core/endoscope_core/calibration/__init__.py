@@ -8,6 +8,7 @@ from endoscope_core.calibration.records import (
     BendingRecord,
     TensionGapError,
     TensionRecord,
+    with_zeros,
     words_of,
     zero_errors,
 )
@@ -18,6 +19,7 @@ __all__ = [
     'CalibrationStep',
     'TensionGapError',
     'TensionRecord',
+    'with_zeros',
     'words_of',
     'zero_errors',
 ]

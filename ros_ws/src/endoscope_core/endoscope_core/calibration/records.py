@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.metrics import width_at_mid_height
+from endoscope_core.names import WIRES
 from endoscope_core.signals import calibration_sinusoid
 
 Array = NDArray[np.float64]
@@ -167,3 +168,9 @@ def words_of(errors: Array, wires: Sequence[str]) -> str:
         if abs(error) > WORTH_TELLING
     ]
     return f'zero of a load cell is off: {", ".join(told)}; set it again' if told else ''
+
+
+def with_zeros(message: str, errors: Array | None) -> str:
+    """A message, and what zeros of cells are off by where `errors`, in N, are large."""
+    words = '' if errors is None else words_of(errors, WIRES)
+    return f'{message}; {words}' if words else message

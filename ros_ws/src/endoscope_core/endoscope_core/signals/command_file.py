@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from endoscope_core.atomic_output import write_text
 from endoscope_core.errors import FileError
+from endoscope_core.names import JOINTS
 
 FloatArray = NDArray[np.float64]
 
 TIME = 'time'
-JOINTS = ('bend_x', 'bend_y')
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 
-from endoscope_core.calibration import words_of
+from endoscope_core.calibration import with_zeros
 from endoscope_core.control import MotorLimits, PhysicalParameters, bending_range
 from endoscope_core.control.internal_model import PROFILE
 from endoscope_core.identification.law_choice import CalibrationFindings
@@ -22,31 +22,27 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from endoscope_core.classifier.classification import ClassificationResult
+    from endoscope_core.judgement import Judgement
 
 NAME = 'calibration: hysteresis class'
 NONE_OF_THEM = 'none'
 REACH = 'reach.'
-TOLD_N = 0.05
-"""Less is no tenth of a newton in words."""
 
 
 def successful_result(
     stamp_ns: int,
-    verdict: 'ClassificationResult',
+    found: 'Judgement',
     backlash: float | None,
     duration: float,
     limits: MotorLimits,
-    plants: Sequence[PhysicalParameters] = (),
     zeros: 'NDArray[np.float64] | None' = None,
-    lost: Sequence[float] | None = None,
 ) -> DiagnosticArray:
-    """Say which class was found; `backlash`, in rad, is None where the tracker could not measure.
+    """Say what was found; `backlash`, in rad, is None where the tracker could not measure it.
 
     `duration`, of the whole calibration, is in s; how far the plants can be bent follows from the
-    rig's `limits`; `zeros` is what the zero of each load cell is off by, in N, and `lost` what the
-    wires of each joint have lost of their pretension, in N, where the plant named the class.
+    rig's `limits`; `zeros` is what the zero of each load cell is off by, in N.
     """
+    verdict, plants, lost = found.verdict, found.plants, found.lost
     values: dict[str, object] = {'class_deg': verdict.class_deg, 'probability': verdict.probability}
     values |= {f'probability_{size}_deg': p for size, p in verdict.probabilities.items()}
     size = verdict.expected_size if backlash is None else backlash
@@ -73,7 +69,7 @@ def successful_result(
             tube = bending_range(plant.joint, limits)
             values |= {f'{REACH}{joint}.low': tube.low, f'{REACH}{joint}.high': tube.high}
     message = f'class {verdict.class_deg} deg with probability {verdict.probability:.3f}'
-    message += lost_in_words(lost)
+    message += found.lost_in_words()
     return _message(stamp_ns, OK, with_zeros(message, zeros), values)
 
 
@@ -99,21 +95,6 @@ def refused_result(
         **_zero_values(zeros),
     }
     return _message(stamp_ns, ERROR, with_zeros(reason, zeros), values)
-
-
-def lost_in_words(lost: Sequence[float] | None) -> str:
-    """That the plant named the class, and what wires have lost in N; empty where it did not."""
-    if lost is None:
-        return ''
-    told = [f'{joint} {x:.1f} N' for joint, x in zip(JOINTS, lost, strict=True) if x >= TOLD_N]
-    losses = f'; the wires have lost pretension ({", ".join(told)}): tighten them' if told else ''
-    return f', by the plant: the classifier knows no such tensions{losses}'
-
-
-def with_zeros(message: str, zeros: 'NDArray[np.float64] | None') -> str:
-    """A message, and what zeros in N of load cells are off by where that is much."""
-    words = '' if zeros is None else words_of(zeros, WIRES)
-    return f'{message}; {words}' if words else message
 
 
 def _zero_values(zeros: 'NDArray[np.float64] | None') -> dict[str, object]:

@@ -12,7 +12,8 @@ from rclpy.task import Future
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from endoscope_core.calibration.calibration_run import CalibrationStep
+from endoscope_core.calibration import CalibrationStep
+from endoscope_core.calibration.order_feedback import CALIBRATE, HOME, OrderFeedback, OrderState
 from endoscope_core.safety.operating_state import CAUSES_PRESENT
 from endoscope_nodes import names
 from endoscope_nodes.client.graph_listener import (
@@ -23,7 +24,6 @@ from endoscope_nodes.client.graph_listener import (
     GraphListener,
     Health,
 )
-from endoscope_nodes.client.order_feedback import CALIBRATE, HOME, OrderFeedback, OrderState
 from endoscope_nodes.runtime.environment import joined_node
 from endoscope_nodes.runtime.qos import EVENT
 

@@ -12,10 +12,11 @@ from rclpy.serialization import deserialize_message
 from rclpy.time import Time
 from std_msgs.msg import Header, String
 
+from endoscope_core.calibration.order_feedback import OrderFeedback, OrderState
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.exit_status import ClosedOnExit
 from endoscope_nodes import names
-from endoscope_nodes.client.order_feedback import OrderFeedback, OrderState
+from endoscope_nodes.client.order_feedback import feedback_of
 from endoscope_nodes.runtime.qos import profile
 from endoscope_nodes.runtime.streams import RawSubscription
 from endoscope_nodes.topics import Qos
@@ -124,7 +125,7 @@ class GraphListener(ClosedOnExit):
                 self.heard_ns[name.partition(':')[0]] = received_ns
 
     def _on_feedback(self, data: bytes, received_ns: int) -> None:
-        order = OrderFeedback.of_message(deserialize_message(data, DiagnosticArray))
+        order = feedback_of(deserialize_message(data, DiagnosticArray))
         if order.state == OrderState.WAITING:
             # Calibration restarts, and its time may too.
             self.orders.clear()

@@ -10,12 +10,12 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
 
+from endoscope_core.calibration.order_feedback import OrderState
 from endoscope_core.errors import FileError
 from endoscope_core.safety import AdoptionCode, BendingRange
 from endoscope_nodes import names
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import PATIENCE_S, GraphError
-from endoscope_nodes.client.order_feedback import OrderState
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, diagnostic_array, status
 from endoscope_nodes.runtime.qos import EVENT
 

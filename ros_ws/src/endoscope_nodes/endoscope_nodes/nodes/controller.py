@@ -14,7 +14,7 @@ from endoscope_nodes.runtime.node_parameters import ControllerParameters
 from endoscope_nodes.runtime.qos import COMMAND, RESULT
 from endoscope_nodes.runtime.streams import JointPublisher, JointSample
 from endoscope_nodes.runtime.ticker import TICK_S
-from endoscope_nodes.safety.sessions import CommandInput, SessionWatch
+from endoscope_nodes.safety.sessions import SessionWatch
 from endoscope_nodes.safety.streams import CommandReport, StreamWatch
 
 _NOTHING = np.zeros(len(names.JOINTS))
@@ -53,7 +53,7 @@ class ControllerNode(EndoscopeNode):
         self._session = SessionWatch(self, self._restart, self._restart)
         self._pose = context.pose_of(self)
         self._calibration = StreamWatch.of(self, names.CALIBRATION_COMMAND, COMMAND)
-        CommandInput(self, self._session, names.SLAVE_COMMAND, self._gate, self._on_command)
+        self._session.commands(names.SLAVE_COMMAND, self._gate, self._on_command)
         self.create_subscription(DiagnosticArray, names.CALIBRATION_RESULT, self._on_result, RESULT)
         self.diagnostics.add('commands', CommandReport(self._gate, self.ticker))
         self.diagnostics.add('feedback', self._report)

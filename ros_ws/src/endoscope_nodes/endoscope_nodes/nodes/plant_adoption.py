@@ -6,11 +6,12 @@ from concurrent.futures import Future
 
 from diagnostic_msgs.msg import DiagnosticArray
 
+from endoscope_core.calibration.order_feedback import OrderState
 from endoscope_core.choices import BY_ADOPTED, PHYSICAL
+from endoscope_core.compensation.law_in_force import LawInForce, Selection
 from endoscope_core.control import AdoptedPlant, AdoptionError, adopted_plant
-from endoscope_core.safety import AdoptionCode, BendingRange
+from endoscope_core.safety import AdoptionCode
 from endoscope_nodes import names
-from endoscope_nodes.client.order_feedback import OrderState
 from endoscope_nodes.client.plant_adoption import AdoptionRequest, PlantInForce
 from endoscope_nodes.runtime.beside import Beside
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
@@ -21,79 +22,56 @@ from endoscope_nodes.safety.sessions import SessionWatch
 _LOOK_S = 0.05
 
 
-Selection = tuple[str, str]
-"""Mode of a compensator, and what selects its parameters."""
-
-
-@dataclasses.dataclass(frozen=True)
-class _Before:
-    """What was in force before a plant was adopted."""
-
-    plant: AdoptedPlant | None  # None where it was no adopted one
-    selection: Selection
-    for_session: bool  # whether that is so again when the session ends
-
-
 class PlantAdoption:
     """Answers ``compensator/adopt``, and says on ``compensator/plant`` what is in force.
 
     A request is obeyed in the motion session that it names, from one sender, and only at rest: when
-    it comes, and once the plant has been tried, which takes a moment. `obstacle` raises an
-    AdoptionError where the slave does not rest, or is bent further than a plant allows; `selected`
-    and `select` get and change what selects the feed-forward, and `ranges` says how far the joints
-    may be bent by it.
+    it comes, and once the plant has been tried, which takes a moment. `check_rest` raises an
+    AdoptionError where the slave does not rest, or is bent further than a plant allows; `select`
+    changes what selects the feed-forward.
     """
 
     def __init__(
         self,
         node: EndoscopeNode,
         session: SessionWatch,
-        obstacle: Callable[[AdoptedPlant | None], None],
-        selected: Callable[[], Selection],
+        law: LawInForce,
+        check_rest: Callable[[AdoptedPlant | None], None],
         select: Callable[[Selection], None],
-        ranges: Callable[[], tuple[BendingRange, ...]],
     ) -> None:
-        self._node, self._session = node, session
-        self._obstacle, self._selected, self._select = obstacle, selected, select
-        self._ranges = ranges
-        self.plant: AdoptedPlant | None = None  # in force while the selection is by it
-        self._before: list[_Before] = []
+        self._node, self._session, self._law = node, session, law
+        self._check_rest, self._select = check_rest, select
         self._request: AdoptionRequest | None = None
         self._trying: Future[AdoptedPlant] | None = None
         self._beside = Beside(node.ticker)
-        self._told = PlantInForce()
-        self._news = True
+        self._answer = PlantInForce()
+        self._pending = True
         self._out = node.create_publisher(DiagnosticArray, names.COMPENSATOR_PLANT, RESULT)
         requests = node.create_subscription(
             DiagnosticArray, names.COMPENSATOR_ADOPT, self._on_request, EVENT
         )
-        self._senders = session.senders_of(requests, self._on_rivals)
+        self._senders = session.senders_of(requests, self._on_competing)
         node.ticker.every(_LOOK_S, self._look)
 
     def tell(self) -> None:
         """Say anew what is in force."""
-        self._news = True
-
-    def end_session(self) -> None:
-        """Go back to the plant from before what was set for the session that has ended."""
-        while self._before and self._before[-1].for_session:
-            self.plant = self._before.pop().plant
+        self._pending = True
 
     def close(self) -> None:
         """Let the thread end in which plants are tried."""
         self._beside.close()
 
-    def _on_rivals(self, rivals: str) -> None:
+    def _on_competing(self, competing: str) -> None:
         """A second sender moves nothing, and neither does the first while he is there."""
         if self._request is not None:
-            self._reject(self._request, AdoptionError(AdoptionCode.OTHER_SENDER, rivals))
+            self._reject(self._request, AdoptionError(AdoptionCode.OTHER_SENDER, competing))
 
     def _on_request(self, message: DiagnosticArray) -> None:
         request = AdoptionRequest.of_message(message)
         if request is None:
             self._node.get_logger().warning(f'{names.COMPENSATOR_ADOPT} is no request: ignored')
             return
-        if request.id == self._told.id:
+        if request.id == self._answer.id:
             if self._request is not None:
                 withdrawn = AdoptionError(AdoptionCode.WITHDRAWN, 'withdrawn: it took too long')
                 self._reject(self._request, withdrawn)
@@ -114,13 +92,13 @@ class PlantAdoption:
 
     def _check(self, request: AdoptionRequest) -> None:
         """Refuse who may not ask, or asks at the wrong time."""
-        rivals = self._senders.rivals()
-        if rivals:
-            raise AdoptionError(AdoptionCode.OTHER_SENDER, rivals)
+        competing = self._senders.rivals()
+        if competing:
+            raise AdoptionError(AdoptionCode.OTHER_SENDER, competing)
         self._check_session(request)
         if self._request is not None:
             raise AdoptionError(AdoptionCode.BUSY, 'busy: another plant is being tried')
-        self._obstacle(None)
+        self._check_rest(None)
 
     def _check_session(self, request: AdoptionRequest) -> None:
         if not self._session.name:
@@ -137,15 +115,14 @@ class PlantAdoption:
             )
 
     def _undo(self, request: AdoptionRequest) -> None:
-        if not self._before:
+        before = self._law.before
+        if before is None:
             raise AdoptionError(
                 AdoptionCode.NOTHING_TO_UNDO, 'no plant has been adopted: there is none before'
             )
-        back = self._before[-1]
-        self._obstacle(back.plant)
-        self._before.pop()
-        self.plant = back.plant
-        self._select(back.selection)
+        self._check_rest(before.plant)
+        self._law.undo()
+        self._select(before.selection)
         self._say(request, OrderState.SUCCEEDED, f'undone: {self._in_words()}')
 
     def _look(self) -> None:
@@ -156,25 +133,24 @@ class PlantAdoption:
             try:
                 plant = trying.result()
                 self._check_session(request)
-                self._obstacle(plant)
+                self._check_rest(plant)
             except AdoptionError as error:
                 self._reject(request, error)
             else:
-                for_session = self._node.get_parameter(FOR_SESSION).value
-                self._before.append(_Before(self.plant, self._selected(), for_session))
-                self.plant = plant
-                self._select((PHYSICAL, BY_ADOPTED))
+                self._law.adopt(plant, self._node.get_parameter(FOR_SESSION).value)
+                self._select(Selection(PHYSICAL, BY_ADOPTED))
                 self._say(request, OrderState.SUCCEEDED, self._in_words())
         now = self._node.ticker.now_ns()
-        if self._news and now:
-            self._news = False
+        if self._pending and now:
+            self._pending = False
             self._publish()
 
     def _in_words(self) -> str:
-        if self.plant is None:
+        plant = self._law.plant
+        if plant is None:
             return 'no plant has been adopted'
-        left_out = ', '.join(self.plant.left_out)
-        return f'plant {self.plant.hash} adopted' + (
+        left_out = ', '.join(plant.left_out)
+        return f'plant {plant.hash} adopted' + (
             f' but for {left_out}, which the inverse does better without' if left_out else ''
         )
 
@@ -195,19 +171,18 @@ class PlantAdoption:
             self._node.get_logger().warning(answer)
         else:
             self._node.get_logger().info(answer)
-        self._told = PlantInForce(id=request.id, state=state, code=code, answer=answer)
+        self._answer = PlantInForce(id=request.id, state=state, code=code, answer=answer)
         self._publish()
 
     def _publish(self) -> None:
-        plant = self.plant
-        before = self._before[-1].plant if self._before else None
-        told = dataclasses.replace(
-            self._told,
+        plant, before = self._law.plant, self._law.before
+        in_force = dataclasses.replace(
+            self._answer,
             plant='' if plant is None else plant.text,
             hash='' if plant is None else plant.hash,
-            before='' if before is None else before.hash,
+            before='' if before is None or before.plant is None else before.plant.hash,
             left_out=() if plant is None else plant.left_out,
             words=self._in_words(),
-            ranges=self._ranges(),
+            ranges=self._law.ranges,
         )
-        self._out.publish(told.message(self._node.ticker.now_ns(), self._session.name))
+        self._out.publish(in_force.message(self._node.ticker.now_ns(), self._session.name))

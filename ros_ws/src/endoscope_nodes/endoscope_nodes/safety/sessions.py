@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import Joy
 from std_msgs.msg import Header
@@ -10,7 +11,7 @@ from endoscope_core.safety import CommandGate, MotionSession, Refusal
 from endoscope_nodes.names import JOINTS, MASTER_CLUTCH, MOTION_SESSION
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
-from endoscope_nodes.runtime.qos import COMMAND, EVENT
+from endoscope_nodes.runtime.qos import COMMAND, EVENT, RESULT
 from endoscope_nodes.runtime.streams import JointSample, JointSubscription
 
 SESSION_REPORT = 'motion session'
@@ -92,6 +93,73 @@ class SessionWatch:
         self._streams.append((senders, on_rivals or self.leave))
         return senders
 
+    def one_sender[T](
+        self,
+        subscribe: Callable[[Callable[[T], None]], Subscription],
+        take: Callable[[T], None],
+        on_competing: Callable[[str], None] | None = None,
+    ) -> None:
+        """Give `take` what `subscribe` hears while it has one sender; see :meth:`senders_of`."""
+        otherwise = on_competing or self.leave
+
+        def receive(message: T) -> None:
+            competing = senders.rivals()
+            if competing:
+                otherwise(competing)
+            else:
+                take(message)
+
+        senders = self.senders_of(subscribe(receive), otherwise)
+
+    def results(
+        self,
+        topic: str,
+        take: Callable[[DiagnosticArray], None],
+        on_competing: Callable[[str], None] | None = None,
+    ) -> None:
+        """Give `take` the results on a latched topic while it has one sender."""
+        self.one_sender(
+            lambda receive: self._node.create_subscription(DiagnosticArray, topic, receive, RESULT),
+            take,
+            on_competing,
+        )
+
+    def commands(
+        self,
+        topic: str,
+        gate: CommandGate,
+        take: Callable[[JointSample], None],
+        obeys: bool = False,
+    ) -> None:
+        """Give `take` the commands of joints of the open session, while they have one sender.
+
+        With `obeys`, see there, too.
+        """
+
+        def receive(sample: JointSample) -> None:
+            if not self.belongs(sample.session):
+                gate.refuse(Refusal.SESSION, sample.session or 'none named')
+                return
+            competing = senders.rivals()
+            if competing:
+                gate.refuse(Refusal.SENDER, competing)
+                self.leave(competing)
+                return
+            take(sample)
+
+        stream = JointSubscription(
+            self._node,
+            topic,
+            JOINTS,
+            receive,
+            COMMAND,
+            exact=True,
+            on_malformed=lambda reason: gate.refuse(Refusal.MALFORMED, reason),
+        )
+        senders = self.senders_of(stream.subscription)
+        if obeys:
+            self.obeys(topic, gate)
+
     def obeys(self, topic: str, gate: CommandGate) -> None:
         """End the node's part where a gate refuses what comes on a topic rather than obey it."""
         self._gates.append((topic, gate))
@@ -153,43 +221,6 @@ class SessionWatch:
         return (ERROR, session.trouble, {}) if session.trouble else (OK, session.name or 'none', {})
 
 
-class CommandInput:
-    """Commands of joints on a topic; `take` gets those of the open session from its one sender."""
-
-    def __init__(
-        self,
-        node: EndoscopeNode,
-        session: SessionWatch,
-        topic: str,
-        gate: CommandGate,
-        take: Callable[[JointSample], None],
-    ) -> None:
-        self._session = session
-        self._gate = gate
-        self._take = take
-        stream = JointSubscription(
-            node,
-            topic,
-            JOINTS,
-            self._receive,
-            COMMAND,
-            exact=True,
-            on_malformed=lambda reason: gate.refuse(Refusal.MALFORMED, reason),
-        )
-        self._senders = session.senders_of(stream.subscription)
-
-    def _receive(self, sample: JointSample) -> None:
-        if not self._session.belongs(sample.session):
-            self._gate.refuse(Refusal.SESSION, sample.session or 'none named')
-            return
-        rivals = self._senders.rivals()
-        if rivals:
-            self._gate.refuse(Refusal.SENDER, rivals)
-            self._session.leave(rivals)
-            return
-        self._take(sample)
-
-
 class ClutchWatch:
     """The clutch as last heard; silence counts as released.
 
@@ -208,8 +239,11 @@ class ClutchWatch:
         self._on_release = on_release
         self._pressed = self._doubted = False
         self._heard_ns = 0
-        subscription = node.create_subscription(Joy, MASTER_CLUTCH, self._receive, EVENT)
-        self._senders = session.senders_of(subscription, self._doubt)
+        session.one_sender(
+            lambda receive: node.create_subscription(Joy, MASTER_CLUTCH, receive, EVENT),
+            self._receive,
+            self._doubt,
+        )
 
     def _doubt(self, rivals: str) -> None:
         self._doubted = True
@@ -217,10 +251,6 @@ class ClutchWatch:
         self._session.leave(rivals)
 
     def _receive(self, message: Joy) -> None:
-        rivals = self._senders.rivals()
-        if rivals:
-            self._doubt(rivals)
-            return
         before = self._pressed
         pressed = bool(message.buttons) and message.buttons[0] == 1
         self._doubted = self._doubted and pressed

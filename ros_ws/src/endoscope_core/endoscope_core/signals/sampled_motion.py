@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.signals import motion_by_name, move
+from endoscope_core.names import JOINTS
 from endoscope_core.signals.command_file import read_command_file
-from endoscope_nodes.names import JOINTS
+from endoscope_core.signals.motions import motion_by_name
+from endoscope_core.signals.signal import move
 
 Array = NDArray[np.float64]
 
