@@ -194,7 +194,7 @@ def test_an_enable_waits_until_the_graph_is_whole_and_says_for_what():
             told.append(what)
             graph.set('load_cells', connected=True)
 
-        client.told = plug_in
+        client.report = plug_in
         client.find(5.0)
         assert client.ask_and_see('enable', 5.0) == 'ENABLED'
         [line] = told

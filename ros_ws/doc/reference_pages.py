@@ -235,7 +235,7 @@ def _report() -> Iterator[str]:
 
 
 def _switch(parameter: Parameter) -> str:
-    return ', '.join(f'{_number(v)}: {parameter.said(v)}' for v in parameter.admissible)
+    return ', '.join(f'{_number(v)}: {parameter.in_words(v)}' for v in parameter.admissible)
 
 
 def _effects() -> Iterator[str]:

@@ -13,8 +13,7 @@ _SECOND = 1_000_000_000
 _AFTER_NS = 2 * _SECOND
 """How long the bag of an event goes on after the last of its events."""
 _REASON_NS = 1_500_000_000
-"""How long the reason of a fault is waited for, which the supervisor tells at once and again every
-second."""
+"""How long the reason of a fault is waited for; the supervisor reports it at once and every s."""
 
 _AT_ONCE = 2
 """Bags that are written at a time, each with the last seconds until it is written; what happens
@@ -49,7 +48,7 @@ class EventKeeping:
         self._recent, self._most, self._folder = recent, most, folder
         self._open_session, self._collect, self._notify = open_session, collect, notify
         self._writing: list[_Writing] = []
-        self._cause = ''  # of the fault that there is, as the supervisor told last
+        self._cause = ''  # of the fault that there is, as the supervisor reported last
         self.state = ''  # operating state; empty before the first one is heard
         self.error = ''  # why the last bag is not whole
         self.marks = 0

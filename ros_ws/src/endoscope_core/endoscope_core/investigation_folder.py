@@ -14,7 +14,7 @@ LOG = 'log.json'
 PAGE = 'index.html'
 """What is known so far, to be read."""
 _UNKNOWN = (errno.EBADF, errno.ENOLCK, errno.ENOTSUP)
-"""A file system that tells nobody who holds a folder."""
+"""A file system that does not show who holds a folder."""
 
 
 @contextmanager

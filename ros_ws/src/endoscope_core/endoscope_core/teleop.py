@@ -73,7 +73,7 @@ class DeadMan:
 class RunningAngles:
     """Angles that run while a grip holds, stay over its end, and do not wind up at a limit.
 
-    What the master wants of the slave tells where a limit is, be it of the joint, of the tube or
+    What the master wants of the slave shows where a limit is, be it of the joint, of the tube or
     of the master's own: the angles wait there, and turn round at once.
     """
 
@@ -93,7 +93,7 @@ class RunningAngles:
         wanted: Sequence[float] | None,
         scale: float,
     ) -> tuple[bool, ...]:
-        """Go on at `speed` (J,) in rad/s, and tell which joints (J,) follow no further.
+        """Go on at `speed` (J,) in rad/s, and return which joints (J,) follow no further.
 
         `usual` (J,) is the greatest speed in rad/s for which the slave is given time to follow,
         `elapsed` the time in s since the last call of this grip, `scale` slave motion for one

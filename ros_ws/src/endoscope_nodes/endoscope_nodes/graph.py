@@ -86,8 +86,8 @@ def check_rates() -> int:
     """Say which rate this machine carries, trying the simulated graph in real time; 1 if none."""
     for rate in RATES:
         share, trouble = _carried(rate)
-        said = f'{100.0 * share:.1f} % of the commands reach the motors'
-        print(f'{rate:>4} Hz: {said}{trouble and f": {trouble}"}', flush=True)
+        text = f'{100.0 * share:.1f} % of the commands reach the motors'
+        print(f'{rate:>4} Hz: {text}{trouble and f": {trouble}"}', flush=True)
         if share >= CARRIED and not trouble:
             how = '' if rate == RATES[0] else f': graph --real-time --ros-args -p tick_rate:={rate}'
             print(f'this machine carries {rate} Hz in real time, as busy as it is now{how}')

@@ -37,8 +37,8 @@ def help_of(
     """Return the help of a program; `options` are its own words, and what each does."""
     words = ''.join(f'[{word}] ' for word, _ in options)
     blank = ' ' * len(f'{name} {words}')
-    said = textwrap.fill(purpose, _WIDTH)
-    parts = [_USAGE.format(name=name, options=words, blank=blank[:-1], purpose=said)]
+    text = textwrap.fill(purpose, _WIDTH)
+    parts = [_USAGE.format(name=name, options=words, blank=blank[:-1], purpose=text)]
     if options:
         parts.append(
             ''.join(_wrapped(does, f'{word:<14}', ' ' * 14) + '\n' for word, does in options)
@@ -75,8 +75,8 @@ def _entry(parameter: Described) -> Iterator[str]:
     # An empty text stands in quotes for the shell.
     yield _wrapped(f'{parameter.name}:={parameter.default}', f'{mark} -p ', ' ' * 10)
     allowed = f'{parameter.allowed or "in"} {parameter.unit}'.strip() if parameter.unit else ''
-    said = [parameter.description, allowed or parameter.allowed]
-    yield _wrapped('; '.join(filter(None, said)), ' ' * 10, ' ' * 10)
+    parts = [parameter.description, allowed or parameter.allowed]
+    yield _wrapped('; '.join(filter(None, parts)), ' ' * 10, ' ' * 10)
 
 
 def _wrapped(text: str, first: str, others: str) -> str:

@@ -1,4 +1,4 @@
-"""Every service of the graph, said once; nothing here needs ROS."""
+"""Every service of the graph, in one place; nothing here needs ROS."""
 
 from dataclasses import dataclass
 

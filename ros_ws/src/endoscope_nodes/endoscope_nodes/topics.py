@@ -1,4 +1,4 @@
-"""The interface: every topic of the graph, said once.
+"""The interface: every topic of the graph, in one place.
 
 Nodes, recorder, help and reference pages take from here; nothing here needs ROS.
 
@@ -48,7 +48,7 @@ class Topic:
     said_by: tuple[str, ...] = ()
     # Nodes; the recorder hears whatever is `recorded`, the simulation clock waits for the streams.
     heard_by: tuple[str, ...] = ()
-    recorded: bool = True  # unless the recorder is told otherwise
+    recorded: bool = True  # unless the recorder is set otherwise
     one_sender: bool = False  # whoever else speaks here while the slave is enabled is a fault
 
 

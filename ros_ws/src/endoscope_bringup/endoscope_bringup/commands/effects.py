@@ -139,7 +139,7 @@ def _place_text(place: 'Place') -> str:
 
 def _parameter(parameter: 'Parameter') -> str:
     if parameter.is_switch:
-        allowed = ', '.join(f'{v:g}: {parameter.said(v)}' for v in parameter.admissible)
+        allowed = ', '.join(f'{v:g}: {parameter.in_words(v)}' for v in parameter.admissible)
     else:
         allowed = f'{parameter.low:g} to {parameter.high:g} {parameter.unit}'
     off = '' if math.isnan(parameter.off) else f', off at {parameter.off:g}'

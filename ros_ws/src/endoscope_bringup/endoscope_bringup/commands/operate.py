@@ -96,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
             joined_graph('operate', args.namespace) as client,
             paused_when_interrupted(client, args.action in MOVING),
         ):
-            client.told = partial(print, file=sys.stderr, flush=True)
+            client.report = partial(print, file=sys.stderr, flush=True)
             reply = act(client, args)
     except GraphError as error:
         if args.json:

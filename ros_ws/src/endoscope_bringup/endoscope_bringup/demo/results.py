@@ -34,7 +34,7 @@ def mean_over_joints(figure: Callable[..., float], desired: Array, actual: Array
 
 @dataclass(frozen=True)
 class CalibrationOutcome:
-    """One calibration: what the wires said and what was made of it."""
+    """One calibration: what the wires showed and what was made of it."""
 
     facts: CalibrationFacts  # what was announced
     time: Array  # (N,), s since the sinusoid began

@@ -84,11 +84,11 @@ def where_signals_were_cut(results: DemoResults, best: Method) -> list[str]:
 
 def of_loops(results: DemoResults, tube: str, motion: str, best: Method) -> str:
     """What a tube's loops show."""
-    said = f'{tube.capitalize()}, {MOTION_TITLE[motion]}. A perfect tip stays on the dotted line.'
+    text = f'{tube.capitalize()}, {MOTION_TITLE[motion]}. A perfect tip stays on the dotted line.'
     if best is Method.NONE:
-        return said
+        return text
     none, with_best = (results.run(tube, motion, m).backlash_deg for m in (Method.NONE, best))
-    return f'{said} Uncompensated its loop is {none:.0f}° wide, by {best} {with_best:.1f}°.'
+    return f'{text} Uncompensated its loop is {none:.0f}° wide, by {best} {with_best:.1f}°.'
 
 
 def of_tracking(results: DemoResults, tube: str, motion: str, methods: Sequence[Method]) -> str:

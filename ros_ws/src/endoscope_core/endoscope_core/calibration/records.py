@@ -162,12 +162,12 @@ def zero_errors(tension: Array) -> Array:
 
 def words_of(errors: Array, wires: Sequence[str]) -> str:
     """Sentence that names the cells whose zero is off by much of `errors` (N); empty if none is."""
-    told = [
+    off = [
         f'{wire} by {error:+.2f} N'
         for wire, error in zip(wires, errors.tolist(), strict=True)
         if abs(error) > WORTH_TELLING
     ]
-    return f'zero of a load cell is off: {", ".join(told)}; set it again' if told else ''
+    return f'zero of a load cell is off: {", ".join(off)}; set it again' if off else ''
 
 
 def with_zeros(message: str, errors: Array | None) -> str:

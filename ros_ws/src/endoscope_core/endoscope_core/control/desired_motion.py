@@ -39,19 +39,19 @@ class _Joint:
         self.play = Play(COUNT, position)
         self.smooth = SmoothFollower(BANDWIDTH, position)
         self.position = position
-        self.said = velocity
+        self.stated = velocity
         self.agreeing = 0
 
     def follow(self, position: float, velocity: float | None, dt: float) -> None:
         moved = position - self.position
-        said, self.said = self.said, velocity
+        stated, self.stated = self.stated, velocity
         self.position = position
         quiet = self.play.follow(position)
         self.smooth.follow(quiet, dt)
-        if velocity is None or said is None:
+        if velocity is None or stated is None:
             return
         mean = moved / dt
-        agrees = max(abs(velocity - mean), abs(said - mean)) <= AGREEMENT
+        agrees = max(abs(velocity - mean), abs(stated - mean)) <= AGREEMENT
         self.agreeing = self.agreeing + 1 if agrees else 0
         if self.agreeing >= AGREEING:
             # From where the estimate would be, had the motion always been as fast: the next message
@@ -85,9 +85,9 @@ class DesiredMotion:
         `velocity` is empty where the message has none. ValueError if an input has another size or
         is not finite, or `dt` is not positive; nothing changes then.
         """
-        said: Sequence[float | None] = velocity if len(velocity) else [None] * self._count
+        stated: Sequence[float | None] = velocity if len(velocity) else [None] * self._count
         numbers = [*position, *velocity]
-        if len(position) != self._count or len(said) != self._count:
+        if len(position) != self._count or len(stated) != self._count:
             raise ValueError(
                 f'{len(position)} positions and {len(velocity)} velocities: '
                 f'there are {self._count} joints'
@@ -95,9 +95,9 @@ class DesiredMotion:
         if not (all(map(math.isfinite, numbers)) and math.isfinite(dt) and dt > 0.0):
             raise ValueError(f'positions, velocities and dt must be finite: {numbers}, dt = {dt} s')
         if not self._joints:
-            self._joints = [_Joint(p, v) for p, v in zip(position, said, strict=True)]
+            self._joints = [_Joint(p, v) for p, v in zip(position, stated, strict=True)]
         else:
-            for joint, p, v in zip(self._joints, position, said, strict=True):
+            for joint, p, v in zip(self._joints, position, stated, strict=True):
                 joint.follow(p, v, dt)
         return (
             tuple([joint.play.value for joint in self._joints]),

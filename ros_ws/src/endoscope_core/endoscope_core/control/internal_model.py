@@ -58,7 +58,7 @@ _TRIES = 60
 _STEPS = 1000
 _MOST_TURNS = 12
 _RAMPS, _RAMP_S = (0.1, 0.2), 5.0
-"""Speeds of a shaft in rad/s, and how long it turns, which tell the lag of a servo with effects."""
+"""Speeds of a shaft in rad/s, and how long it turns, which show the lag of a servo with effects."""
 _ALONE = 'joint'
 _BEYOND = 10.0
 """Rad to which no joint bends."""

@@ -124,10 +124,10 @@ class FollowedHandle(Source):
 
     def next(self, now_ns: int, periods: int) -> Desired:
         position = self.shaper.position
-        # A handle that was silent while the slave was told to stay is taken up from there.
+        # A handle that was silent while the slave was commanded to stay is taken up from there.
         if self.followed is None and self.is_there(now_ns):
             self.begin(position)
-        # While the handle is silent and the clutch still held, the slave is told to stay.
+        # While the handle is silent and the clutch still held, the slave is commanded to stay.
         return self.followed or Desired(position, (0.0,) * len(position))
 
 

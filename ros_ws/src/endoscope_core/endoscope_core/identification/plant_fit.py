@@ -235,7 +235,7 @@ def fits_of_calibration(
     All have the same joint-equivalent motor command (N,) in rad at 1 kHz; `gear` is the shaft's
     angle for one radian at the joint. Tensions (N, 2 J) in N are of the positive and the negative
     wire of each joint in turn. Where friction lets the joint go to one side only a little, the way
-    to the other shows where it rests: a motion to one side and back tells a tight tube's reach
+    to the other shows where it rests: a motion to one side and back shows a tight tube's reach
     worse than one to both. A PlantFitError if the recording shows no plant.
     """
     u = np.asarray(command, dtype=float)

@@ -29,8 +29,8 @@ def tip_pose(bending: ArrayLike, length: float) -> tuple[Array, Array]:
     """Position (3,) in m and orientation (4,) x, y, z, w of the tip in the frame of the base.
 
     `bending` (2,) is ``bend_x`` and ``bend_y`` in rad, `length` that of the section in m.
-    ValueError if the section would bend by half a turn or more: orientation no longer tells the
-    angles.
+    ValueError if the section would bend by half a turn or more: orientation then leaves the angles
+    open.
     """
     x, y = (float(v) for v in np.asarray(bending, dtype=float))
     angle = math.hypot(x, y)

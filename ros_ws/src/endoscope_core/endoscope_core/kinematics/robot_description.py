@@ -76,7 +76,7 @@ def _tip(link: Element, section: Vertebrae) -> None:
 
 
 def _wires(link: Element, section: Vertebrae, start: float, stop: float) -> None:
-    """Draw the four wires along the outside, where their tensions are told by their names."""
+    """Draw the four wires along the outside, where their names show whose tension is drawn."""
     away = 1.02 * _RADIUS * section.length
     middle = 0.5 * (start + stop)
     for material, x, y in (

@@ -64,7 +64,7 @@ class Parameter:
         """All values of a switch."""
         return self.choices or tuple(range(int(self.low), int(self.high) + 1))
 
-    def said(self, value: float) -> str:
+    def in_words(self, value: float) -> str:
         """What a value of a switch stands for."""
         nearest = min(self.admissible, key=lambda choice: abs(choice - value))
         return self.words[self.admissible.index(nearest)]
@@ -83,13 +83,13 @@ class Symptom(StrEnum):
 class Traits:
     """What a search for missing physics must know of an effect."""
 
-    depends_on_time: bool = False  # told from others only where a motion is made twice
+    depends_on_time: bool = False  # distinguished from others only where a motion is made twice
     of_device: bool = False  # belongs to a device that all joints share
     of_shape: bool = False  # belongs to the tube's shape, and is another in each recording
     rugged: bool = False  # many valleys: a fit needs many starts and wide difference steps
     audited: bool = False  # no simulation shows it: it is found in the recording itself
     symptom: Symptom | None = None  # by which the recording itself shows it
-    # What it does is not told from a change with time where a motion is made once.
+    # What it does is confounded with a change with time where a motion is made once.
     resembles_time: bool = False
     # Nominal parameter that it scales by so much that a described value is ambiguous, and by how
     # much.

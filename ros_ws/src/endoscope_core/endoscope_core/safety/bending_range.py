@@ -20,11 +20,11 @@ class BendingRange:
 
 def ranges_in_words(ranges: Sequence[BendingRange], joints: Sequence[str]) -> str:
     """How far the joints of these names can be bent, in degrees, as a sentence without its stop."""
-    said = ', '.join(
+    words = ', '.join(
         f'{joint} from {math.degrees(r.low):.0f} to {math.degrees(r.high):.0f} deg'
         for joint, r in zip(joints, ranges, strict=True)
     )
-    return f'this tube can be bent: {said}'
+    return f'this tube can be bent: {words}'
 
 
 def keep_within(

@@ -72,7 +72,7 @@ def numbers_of(effect: NamedEffect) -> list[Shown]:
 def form(effect: NamedEffect) -> tuple[str, ...]:
     """What the switches of an effect stand for, in words."""
     return tuple(
-        parameter.said(effect.parameters[parameter.name].value)
+        parameter.in_words(effect.parameters[parameter.name].value)
         for parameter in effect.definition.parameters
         if parameter.is_switch and parameter.name in effect.parameters
     )

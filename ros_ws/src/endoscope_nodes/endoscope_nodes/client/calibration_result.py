@@ -129,7 +129,7 @@ def is_of_no_class(message: DiagnosticArray) -> bool:
 
 
 def findings_of(message: DiagnosticArray) -> CalibrationFindings | None:
-    """Read all that a compensator can use out of a result; None where it tells of no success."""
+    """Read all that a compensator can use out of a result; None where it reports no success."""
     for item in message.status:
         if item.name != NAME or item.level != OK:
             continue
@@ -148,7 +148,7 @@ def findings_of(message: DiagnosticArray) -> CalibrationFindings | None:
 
 
 def plant_values(plants: Sequence[PhysicalParameters]) -> dict[str, object]:
-    """Keys and values by which a result tells of identified plants, one for each joint."""
+    """Keys and values by which a result reports identified plants, one for each joint."""
     return {
         f'{joint}.{name}': value
         for joint, plant in zip(JOINTS, plants, strict=True)

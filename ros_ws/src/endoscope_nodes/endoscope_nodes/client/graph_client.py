@@ -54,7 +54,7 @@ class GraphClient(GraphListener):
     ) -> None:
         super().__init__(node, serve, clock)
         # Called with what is waited for, in words, before an order can be given.
-        self.told: Callable[[str], object] = lambda what: None
+        self.report: Callable[[str], object] = lambda what: None
         self._orders = node.create_publisher(String, names.STATE_COMMAND, EVENT)
         self._clients: dict[str, Client] = {}
 
@@ -123,15 +123,15 @@ class GraphClient(GraphListener):
     ) -> None:
         """Give a command, again where it brought no answer, until it is done."""
         asked_ns = time.time_ns()
-        # A refusal is told until the next one, by a stamp of the supervisor's.
+        # A refusal is reported until the next one, by a stamp of the supervisor's.
         self.wait_for(lambda: self.graph_ns > 0, 'the supervisor', patience_s)
         graph_ns, begun_in = self.graph_ns, self.state
 
         def is_refused() -> bool:
-            said = self.health.get(SUPERVISOR)
-            if said is None or said.received_ns <= asked_ns or not said.values[names.REFUSAL]:
+            latest = self.health.get(SUPERVISOR)
+            if latest is None or latest.received_ns <= asked_ns or not latest.values[names.REFUSAL]:
                 return False
-            return int(said.values[names.REFUSED_NS]) >= graph_ns
+            return int(latest.values[names.REFUSED_NS]) >= graph_ns
 
         for _ in range(1 + int(patience_s / _REPEATED_AFTER_S)):
             if withdrawn():
@@ -147,19 +147,19 @@ class GraphClient(GraphListener):
                     if done():
                         return None
                     continue
-                said = self.health[SUPERVISOR].values
-                if said[names.REFUSAL_CODE] == CAUSES_PRESENT and self._becomes_whole(
-                    said[names.REFUSAL]
+                refusal = self.health[SUPERVISOR].values
+                if refusal[names.REFUSAL_CODE] == CAUSES_PRESENT and self._becomes_whole(
+                    refusal[names.REFUSAL]
                 ):
                     return self._ask(command, done, what, patience_s, withdrawn)
-                raise GraphError(said[names.REFUSAL])
+                raise GraphError(refusal[names.REFUSAL])
         raise GraphError(f'timed out after {patience_s:g} s{self.pace} waiting for {what}')
 
     def _becomes_whole(self, refused: str) -> bool:
         """Wait where that was the reason of a refusal; whether the streams have come since."""
         if not self.awaited:
             return False
-        self.told(f'waits until the graph is whole: {refused}')
+        self.report(f'waits until the graph is whole: {refused}')
         return self.wait_until(lambda: not self.awaited, WHOLE_S)
 
     def mark(self, text: str, patience_s: float = PATIENCE_S) -> str:
@@ -181,10 +181,10 @@ class GraphClient(GraphListener):
             )
         finally:
             self.node.destroy_publisher(marks)
-        said = self.health[EVENTS]
-        if said.level:
-            raise GraphError(said.message)
-        return said.values[names.LAST_EVENT]
+        events = self.health[EVENTS]
+        if events.level:
+            raise GraphError(events.message)
+        return events.values[names.LAST_EVENT]
 
     def home(self, patience_s: float = PATIENCE_S, withdrawn: Callable[[], object] = _never) -> str:
         """Go home, and wait until the slave is there; what calibration says of it."""
@@ -252,10 +252,10 @@ class GraphClient(GraphListener):
         if ended.state != OrderState.SUCCEEDED:
             raise GraphError(ended.words)
 
-        def is_told() -> bool:
+        def has_come() -> bool:
             return self.calibration is not None and self.calibration.stamp_ns > ended.id
 
-        self.wait_for(is_told, names.CALIBRATION_RESULT, patience_s)
+        self.wait_for(has_come, names.CALIBRATION_RESULT, patience_s)
         return cast(Health, self.calibration)
 
     def trigger(self, service: str, patience_s: float = PATIENCE_S) -> str:

@@ -41,12 +41,12 @@ class GraphError(EndoscopeError):
 
 @dataclass(frozen=True)
 class Health:
-    """What a node last said of a part of itself on ``/diagnostics``, or of a result."""
+    """What a node last reported of a part of itself on ``/diagnostics``, or of a result."""
 
     level: int  # 0 for good health, 1 for a warning, 2 for an error
     message: str
     values: dict[str, str]
-    stamp_ns: int  # said, by the graph's clock
+    stamp_ns: int  # of the report, by the graph's clock
     received_ns: int  # heard, by this machine's clock
     session: str = ''  # motion session that it is of, for results
 
@@ -146,22 +146,22 @@ class GraphListener(ClosedOnExit):
     @property
     def why(self) -> str:
         """Why the supervisor forbids motion; empty where it does not."""
-        said = self.health.get(SUPERVISOR)
-        if said is None:
+        latest = self.health.get(SUPERVISOR)
+        if latest is None:
             return ''
-        return said.values.get('cause') or said.values.get('present causes', '')
+        return latest.values.get('cause') or latest.values.get('present causes', '')
 
     @property
     def awaited(self) -> str:
         """What the supervisor has never heard and has to hear; empty where the graph is whole."""
-        said = self.health.get(SUPERVISOR)
-        return '' if said is None else said.values[names.AWAITED]
+        latest = self.health.get(SUPERVISOR)
+        return '' if latest is None else latest.values[names.AWAITED]
 
     @property
     def factor(self) -> float | None:
-        """Simulated seconds in a real one, as last told; None where time is real, or before."""
-        said = self.health.get(LOCK_STEP)
-        factor = math.nan if said is None else float(said.values[names.FACTOR])
+        """Simulated seconds in a real one, as last reported; None where time is real, or before."""
+        latest = self.health.get(LOCK_STEP)
+        factor = math.nan if latest is None else float(latest.values[names.FACTOR])
         return factor if math.isfinite(factor) else None
 
     @property

@@ -36,7 +36,7 @@ class HandleSender:
         self._angles = JointPublisher(node, MASTER_MEASURED, JOINTS, ('position',), SENSOR_OFFERED)
         self._clutch = node.create_publisher(Joy, MASTER_CLUTCH, EVENT)
         self._said_ns = 0
-        self.clutch = False  # whether it is held, as was last said
+        self.clutch = False  # whether it is held, as last published
 
     def press(self, held: bool, stamp_ns: int) -> None:
         """Say at once whether the clutch is held; stamped in ns."""

@@ -175,9 +175,9 @@ class MotionPlayer:
         """Record to a bag, until `after`."""
         client = self._client
         client.wait_until(lambda: RECORDER in client.health, PATIENCE_S)
-        said = client.health.get(RECORDER)
+        latest = client.health.get(RECORDER)
         before = read_parameter(client, f'{RECORDER_NODE}.bag', PATIENCE_S).value
-        written = None if said is None else said.values.get(names.BAG)
+        written = None if latest is None else latest.values.get(names.BAG)
         if written is not None and is_left_behind(Path(written), bag.parent):
             # The next recording would have the name of this one.
             before = ''
@@ -219,8 +219,8 @@ class MotionPlayer:
         asked_ns = client.graph_ns
 
         def is_at_its_end() -> bool:
-            said = client.health.get(MASTER)
-            heard = said is not None and said.values[names.FINISHED] == 'True'
+            latest = client.health.get(MASTER)
+            heard = latest is not None and latest.values[names.FINISHED] == 'True'
             return heard and client.graph_ns > asked_ns + round(NEXT_WORD_S * 1e9)
 
         patience_s = math.inf if self._hold_to_play else motion.duration + PATIENCE_S
@@ -240,7 +240,7 @@ class MotionPlayer:
         self._require_enabled(session)
 
     def _session(self) -> str:
-        """The motion session that has been opened, which is told a beat after the state."""
+        """The motion session that has been opened, which is published a beat after the state."""
         client = self._client
         client.wait_until(lambda: bool(client.session) or client.state != 'ENABLED', PATIENCE_S)
         return client.session

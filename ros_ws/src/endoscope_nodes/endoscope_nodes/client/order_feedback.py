@@ -20,8 +20,8 @@ def feedback_message(feedback: OrderFeedback, stamp_ns: int) -> DiagnosticArray:
 
 def feedback_of(message: DiagnosticArray) -> OrderFeedback:
     """Read it."""
-    [said] = message.status
-    texts = {item.key: item.value for item in said.values}
+    [status] = message.status
+    texts = {item.key: item.value for item in status.values}
     return OrderFeedback(
         texts['order'],
         int(texts['id']),
@@ -29,5 +29,5 @@ def feedback_of(message: DiagnosticArray) -> OrderFeedback:
         texts['phase'],
         float(texts['progress']),
         OrderCode(texts['code']),
-        said.message,
+        status.message,
     )

@@ -52,9 +52,9 @@ class AdoptionRequest:
     @classmethod
     def of_message(cls, message: DiagnosticArray) -> 'AdoptionRequest | None':
         """Read it; None where it is none."""
-        for said in message.status:
-            values = {item.key: item.value for item in said.values}
-            if said.name == REQUEST and set(values) == {'id', 'plant'}:
+        for part in message.status:
+            values = {item.key: item.value for item in part.values}
+            if part.name == REQUEST and set(values) == {'id', 'plant'}:
                 return cls(values['id'], values['plant'], message.header.frame_id)
         return None
 
@@ -102,11 +102,11 @@ class PlantInForce:
     @classmethod
     def of_message(cls, message: DiagnosticArray) -> 'PlantInForce | None':
         """Read it; None where it is none."""
-        said = {each.name: each for each in message.status}
-        if not {IN_FORCE, ADOPTION} <= set(said):
+        part = {each.name: each for each in message.status}
+        if not {IN_FORCE, ADOPTION} <= set(part):
             return None
-        own = {item.key: item.value for item in said[IN_FORCE].values}
-        asked = {item.key: item.value for item in said[ADOPTION].values}
+        own = {item.key: item.value for item in part[IN_FORCE].values}
+        asked = {item.key: item.value for item in part[ADOPTION].values}
         known = [joint for joint in names.JOINTS if f'{_REACH}{joint}.low' in own]
         try:
             return cls(
@@ -118,11 +118,11 @@ class PlantInForce:
                     BendingRange(*(float(own[f'{_REACH}{joint}.{end}']) for end in ('low', 'high')))
                     for joint in known
                 ),
-                said[IN_FORCE].message,
+                part[IN_FORCE].message,
                 asked['id'],
                 OrderState(asked['state']),
                 AdoptionCode(asked['code']),
-                said[ADOPTION].message,
+                part[ADOPTION].message,
             )
         except (KeyError, ValueError, TypeError):
             return None
@@ -149,7 +149,7 @@ class AdoptedPlants:
 
     def __init__(self, client: GraphClient) -> None:
         self._client = client
-        self.in_force: PlantInForce | None = None  # as last told; None before
+        self.in_force: PlantInForce | None = None  # as last reported; None before
         self._asked = ''
         self._publisher: Publisher | None = None
         self._asking = threading.Lock()
@@ -157,12 +157,12 @@ class AdoptedPlants:
         client.listen(DiagnosticArray, names.COMPENSATOR_PLANT, self._take, latched=True)
 
     def _take(self, data: bytes, _: int) -> None:
-        told = PlantInForce.of_message(deserialize_message(data, DiagnosticArray))
-        if told is None:
+        reported = PlantInForce.of_message(deserialize_message(data, DiagnosticArray))
+        if reported is None:
             return
-        self.in_force = told
-        if told.id == self._asked:
-            self._answer = told
+        self.in_force = reported
+        if reported.id == self._asked:
+            self._answer = reported
 
     @property
     def _final(self) -> PlantInForce | None:

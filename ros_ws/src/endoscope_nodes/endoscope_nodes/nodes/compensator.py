@@ -70,7 +70,7 @@ class CompensatorNode(EndoscopeNode):
             self.law.end_session()
         self._settings = parameters
         self.law.select(Selection(parameters.mode, parameters.selected_by))
-        self._adoption.tell()
+        self._adoption.publish()
 
     def _reselect(self, selection: Selection) -> None:
         wanted: dict[str, str | bool] = dict(selection._asdict())

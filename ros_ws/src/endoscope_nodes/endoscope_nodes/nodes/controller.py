@@ -46,7 +46,7 @@ class ControllerNode(EndoscopeNode):
         self._used_ns = 0
         self._last_stamp_ns = 0
         self._forget = False
-        self._told = 0
+        self._reported = 0
         self._corrections = JointPublisher(
             self, names.CORRECTION, names.JOINTS, ('position',), COMMAND
         )
@@ -126,8 +126,8 @@ class ControllerNode(EndoscopeNode):
         if not self._pose.tracks:
             return WARN, f'{names.SLAVE_MEASURED} is silent: feed-forward alone', values
         # Measurements are taken with commands: at rest none of them is fresh, however many come.
-        idle = self._corrections.count == self._told
-        self._told = self._corrections.count
+        idle = self._corrections.count == self._reported
+        self._reported = self._corrections.count
         if idle:
             return OK, f'waiting for {names.SLAVE_COMMAND}', values
         if not controller.tracker_fresh(self._last_stamp_ns * 1e-9):

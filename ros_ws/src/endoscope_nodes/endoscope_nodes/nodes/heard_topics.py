@@ -52,7 +52,7 @@ class HeardTopics:
         self._sources: list[_Source] = []
         self._to_look_at: list[_Source] = []
         self._last_ns = 0
-        self.untyped = list(topics)  # whose type nobody has told yet
+        self.untyped = list(topics)  # whose type is not known yet
         # Numbers of topics whose last message holds until the next one: bags begin with these.
         self.holding: set[int] = set()
         self._subscribe_untyped()

@@ -36,7 +36,7 @@ class LoadCellsNode(EndoscopeNode):
         self._settings = self.parameters(LoadCellsParameters, self._on_parameters)
         p = self._settings
         self._last_ns = 0
-        self._told = ''
+        self._reported = ''
         self._cells: LoadCellDevice | None = None
         self._measured = JointPublisher(
             self, names.WIRES_MEASURED, names.WIRES, ('effort',), SENSOR_OFFERED
@@ -93,8 +93,8 @@ class LoadCellsNode(EndoscopeNode):
         for reading in self._cells.take():
             self._publish(reading.time_ns + to_stamp_ns, reading.tension)
         trouble = self._cells.trouble
-        if bool(trouble) != bool(self._told):
-            self._told = trouble
+        if bool(trouble) != bool(self._reported):
+            self._reported = trouble
             self.diagnostics.publish()
 
     def _publish(self, stamp_ns: int, tension: tuple[float, ...]) -> None:

@@ -183,10 +183,10 @@ class MasterNode(EndoscopeNode):
         refused = sum(handle.refused.values())
         fresh, self._refused_before = refused - self._refused_before, refused
         if fresh:
-            said = (
+            text = (
                 f'{fresh} messages of {names.MASTER_MEASURED} refused, last: {handle.last_reason}'
             )
-            return WARN, said, values
+            return WARN, text, values
         unheeded = self._unheeded()
         if unheeded and not self._warned:
             self._warned = True

@@ -76,8 +76,8 @@ class MotorDriverNode(EndoscopeNode):
         self._rig_kind = self._describe_rig(context)
         self._kinds = self.create_publisher(String, names.RIG_KIND, RESULT)
         self._tell_kind()
-        self._told: tuple[float, ...] = ()
-        self._told_ns = 0
+        self._sent: tuple[float, ...] = ()
+        self._sent_ns = 0
         self._torque = False
         if self._slave is not None:
             self._wires = JointPublisher(
@@ -166,7 +166,7 @@ class MotorDriverNode(EndoscopeNode):
         self._notice_trouble()
         self._judge_what_arrived()
         goal = self.motion.turn(self.ticker.monotonic_ns(), periods * TICK_S)
-        self._session.tell()
+        self._session.publish()
         reading = self._device.exchange(goal or (0.0,) * len(names.MOTORS), periods)
         if self._slave is not None:
             # The plant has just gone on under it for these periods.
@@ -201,8 +201,8 @@ class MotorDriverNode(EndoscopeNode):
         self._arrived.clear()
 
     def _tell_setpoint(self, since_ns: int, goal: tuple[float, ...]) -> None:
-        if goal and (goal != self._told or since_ns - self._told_ns >= _REPEATED_NS):
-            self._told, self._told_ns = goal, since_ns
+        if goal and (goal != self._sent or since_ns - self._sent_ns >= _REPEATED_NS):
+            self._sent, self._sent_ns = goal, since_ns
             self._setpoint.publish(since_ns, *goal)
 
     def _notice_trouble(self) -> None:

@@ -53,7 +53,7 @@ class PlantAdoption:
         self._senders = session.senders_of(requests, self._on_competing)
         node.ticker.every(_LOOK_S, self._look)
 
-    def tell(self) -> None:
+    def publish(self) -> None:
         """Say anew what is in force."""
         self._pending = True
 

@@ -39,8 +39,8 @@ class RecorderNode(EndoscopeNode):
 
     In real time a message is recorded with the middleware's stamps of receipt and publication. In
     simulated time both are the tick of ``/clock`` in which it came, so that the same simulation
-    gives the same bag. Losses, found as gaps in the publishers' numbers, and a full disk are told
-    in the diagnostics, in the bag, and by exit code 1.
+    gives the same bag. Losses, found as gaps in the publishers' numbers, and a full disk are
+    reported in the diagnostics, in the bag, and by exit code 1.
 
     What came in the last seconds is kept in memory whether or not it is recorded. When the slave
     goes to ``FAULT``, or ``recorder/mark`` says something, it and what follows becomes a bag of its
@@ -50,7 +50,7 @@ class RecorderNode(EndoscopeNode):
     def __init__(self, context: NodeContext) -> None:
         super().__init__('recorder', context)
         p = self.parameters(RecorderParameters, self._on_parameters)
-        if p.keep and context.told('watch', 'active'):
+        if p.keep and context.value_given('watch', 'active'):
             p = replace(p, keep=max(p.keep, _WATCHED_S))
         self._keeps = p.keep > 0.0
         recent = RecentMessages(p.keep, p.keep_room * _MEGABYTE)

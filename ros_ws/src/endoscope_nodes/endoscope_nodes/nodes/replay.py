@@ -115,7 +115,7 @@ class ReplayNode(EndoscopeNode):
             self._end(f'{self._played} replayed', failed=False)
 
     def _publish_until(self, end_ns: int) -> bool:
-        """Publish what was received before `end_ns`; tell whether there is more."""
+        """Publish what was received before `end_ns`; return whether there is more."""
         message = self._next
         while message is not None and message.log_ns < end_ns:
             self._outputs[message.topic].publish(message.data)
@@ -172,7 +172,7 @@ class ReplayNode(EndoscopeNode):
 
 
 def _offered(topic: Topic) -> QoSProfile:
-    """As it was offered when recorded; a deep queue where the recording does not tell."""
+    """As it was offered when recorded; a deep queue where the recording does not state it."""
     latched = bool(topic.qos) and all(q.durability == 'transient_local' for q in topic.qos)
     best_effort = bool(topic.qos) and all(q.reliability == 'best_effort' for q in topic.qos)
     return QoSProfile(

@@ -197,11 +197,11 @@ class SimulationClockNode(EndoscopeNode):
 
     def _report(self) -> Report:
         factor, speed = self.factor, self._settings.speed
-        said = 'as fast as this machine can'
+        text = 'as fast as this machine can'
         if speed:
             slow = factor < _AS_ASKED * speed
-            said = f'at {factor:.2f} of real time, {said}' if slow else f'at {speed:g} of real time'
-        return OK, said, {'ticks': self.ticks, FACTOR: factor, 'speed': speed}
+            text = f'at {factor:.2f} of real time, {text}' if slow else f'at {speed:g} of real time'
+        return OK, text, {'ticks': self.ticks, FACTOR: factor, 'speed': speed}
 
 
 class SelfStartingClock(SimulationClockNode):

@@ -18,7 +18,7 @@ from endoscope_nodes.safety.sessions import SESSION_REPORT, senders_in_words
 from endoscope_nodes.safety.streams import StreamWatch
 from endoscope_nodes.topics import TOPICS
 
-# Subcomponents whose errors forbid motion; their nodes tell them at once.
+# Subcomponents whose errors forbid motion; their nodes report them at once.
 _VITAL = ('motor_driver: device', 'load_cells: cells')
 
 
@@ -125,7 +125,7 @@ class SupervisorNode(EndoscopeNode):
         elif self.machine.report_cause(name, trouble):
             self.get_logger().error(f'{OperatingState.FAULT}: {trouble}')
             self._publish()
-            # Once somebody has left a fault, nobody is told its cause any more.
+            # Once somebody has left a fault, its cause is reported no more.
             self.diagnostics.publish()
 
     def _report(self) -> Report:

@@ -1,4 +1,4 @@
-"""Watches whether the rig that moves is still the one that its plant describes, and tells."""
+"""Watches whether the rig that moves still matches its plant, and reports it."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
@@ -49,7 +49,7 @@ class _Stream:
 
     subscription: RawSubscription
     names: Sequence[str]
-    columns: Callable[[JointStateSeries], Sequence[_Array]]  # what is told of them, each (N, J)
+    columns: Callable[[JointStateSeries], Sequence[_Array]]  # what is read of them, each (N, J)
     unreadable: int = 0  # messages without a number of theirs
 
     def take(self) -> tuple[NDArray[np.int64], _Array]:
@@ -60,12 +60,12 @@ class _Stream:
         payloads = Payloads(b''.join(data), np.cumsum(size) - size, size)
         try:
             if data:
-                said = decode_joint_states(self.subscription.topic, payloads, none, none, none)
-                values = np.hstack(self.columns(said.select(self.names)))
+                decoded = decode_joint_states(self.subscription.topic, payloads, none, none, none)
+                values = np.hstack(self.columns(decoded.select(self.names)))
                 # Somebody else's joints on this topic would have none of our numbers.
                 ours = np.isfinite(values).any(axis=1)
                 self.unreadable += int((~ours).sum())
-                return said.stamp_ns[ours], values[ours]
+                return decoded.stamp_ns[ours], values[ours]
         except BagError:
             self.unreadable += len(data)
         return none[:0], np.empty((0, 0))
@@ -97,7 +97,7 @@ class WatchNode(EndoscopeNode):
         self._origin_ns = 0
         self._newest_s = 0.0
         self._heard_ns = self.ticker.monotonic_ns()
-        self._told: dict[str, Alarm] = {}
+        self._alarms: dict[str, Alarm] = {}
         self._kept: set[str] = set()
         # Of small matrices: threads for each would stand in the way of the other nodes.
         threadpool_limits(1, 'blas')
@@ -144,9 +144,9 @@ class WatchNode(EndoscopeNode):
         return f'watching for a rig other than {self._source}' if self._active else ''
 
     def _on_plant(self, message: DiagnosticArray) -> None:
-        told = PlantInForce.of_message(message)
-        if told is not None and told.hash != self._adopted.hash:
-            self._adopted, self._wanted = told, True
+        reported = PlantInForce.of_message(message)
+        if reported is not None and reported.hash != self._adopted.hash:
+            self._adopted, self._wanted = reported, True
 
     def _restart(self) -> tuple[bool, str]:
         if not self._active:
@@ -164,7 +164,7 @@ class WatchNode(EndoscopeNode):
         work = self._begin if self._wanted else self._judge
         if self._wanted:
             self._wanted = False
-            self._told, self._kept = {}, set()
+            self._alarms, self._kept = {}, set()
         self._judging = self._beside.submit(work)
 
     def _begin(self) -> None:
@@ -202,8 +202,8 @@ class WatchNode(EndoscopeNode):
         """Say what is new, and have the recorder keep what led to it."""
         news = False
         for alarm in self.rig_watch.alarms:
-            if self._told.get(alarm.joint) != alarm:
-                self._told[alarm.joint] = alarm
+            if self._alarms.get(alarm.joint) != alarm:
+                self._alarms[alarm.joint] = alarm
                 self.get_logger().warning(self._in_words(alarm))
                 news = True
             late = self._newest_s > alarm.at + _NAMED_S
@@ -234,7 +234,7 @@ class WatchNode(EndoscopeNode):
             values[f'{joint.name} learnt [s]'] = BLOCK_S * min(joint.test.learnt, LEARNT)
         for name, stream in self._streams.items():
             values[f'{name} unreadable'] = stream.unreadable
-        for alarm in self._told.values():
+        for alarm in self._alarms.values():
             values |= {
                 f'{alarm.joint} told at': self._utc(alarm.at),
                 f'{alarm.joint} since': self._utc(alarm.since),
@@ -242,8 +242,8 @@ class WatchNode(EndoscopeNode):
                 f'{alarm.joint} change': alarm.change,
                 f'{alarm.joint} margin': alarm.margin,
             }
-        if self._told:
-            return WARN, '; '.join(map(self._in_words, self._told.values())), values
+        if self._alarms:
+            return WARN, '; '.join(map(self._in_words, self._alarms.values())), values
         if self.ticker.monotonic_ns() - self._heard_ns > _SILENT_S * _SECOND:
             return STALE, f'nothing is heard of {names.MOTOR_MEASURED}', values
         if not watch.ready:

@@ -150,12 +150,12 @@ def check_sections(args: Sequence[str], namespace: str) -> list[str]:
     for node in given_to_nodes(args):
         # One that is renamed keeps the name of its program here.
         _check(f"'-p {node}:'", f'/**/{node}', sorted(OF_NODE), namespace)
-    told = []
+    notes = []
     for file in _values_of(args, ('--params-file',)):
         for section in _sections(file):
             if not _check(f"{file}: section '{section}'", section, known, namespace):
-                told.append(f"{file}: section '{section}' is for no node in {namespace}")
-    return told
+                notes.append(f"{file}: section '{section}' is for no node in {namespace}")
+    return notes
 
 
 def given_to_nodes(args: Sequence[str]) -> dict[str, dict[str, object]]:

@@ -69,5 +69,5 @@ class Diagnostics:
         now = self._ticker.now_ns()
         if now == 0 or not self._reports:
             return
-        told = [status(name, *report(), hardware) for name, hardware, report in self._reports]
-        self._publisher.publish(diagnostic_array(now, *told))
+        reports = [status(name, *report(), hardware) for name, hardware, report in self._reports]
+        self._publisher.publish(diagnostic_array(now, *reports))

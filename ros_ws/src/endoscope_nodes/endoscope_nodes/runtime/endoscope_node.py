@@ -125,7 +125,7 @@ class EndoscopeNode(EventlessNode):
 
     @property
     def announcement(self) -> str:
-        """What it is, in the line that tells that the process can be operated; may be empty."""
+        """What it is, in the line that reports that the process can be operated; may be empty."""
         return ''
 
     @property

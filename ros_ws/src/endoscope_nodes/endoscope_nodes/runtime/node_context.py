@@ -114,8 +114,8 @@ class NodeContext:
             values = {key: value.value for key, value in given.items()}
             return values | given_to_nodes(self._args).get(name, {})
 
-    def told(self, name: str, parameter: str) -> object:
-        """Value that this process was told to give a node's parameter; None for none."""
+    def value_given(self, name: str, parameter: str) -> object:
+        """Value that this process was asked to give a node's parameter; None for none."""
         return {**self.given(name), **self._overrides.get(name, {})}.get(parameter)
 
     @contextmanager
@@ -141,7 +141,7 @@ class NodeContext:
                 self.clock = CLOCK.strip('/')
 
     def overrides_of(self, name: str) -> list[Parameter]:
-        """Parameter values that this process was told to give the node called ``name``."""
+        """Parameter values that this process was asked to give the node called ``name``."""
         values: dict[str, object] = {'use_sim_time': True} if self.chosen else {}
         values |= self.chosen if name == CLOCK_NODE else {}
         values |= given_to_nodes(self._args).get(name, {})

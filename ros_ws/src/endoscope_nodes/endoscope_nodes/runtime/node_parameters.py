@@ -1,4 +1,4 @@
-"""Parameters of all nodes: name, default, bounds, unit and meaning of each, said once.
+"""Parameters of all nodes: name, default, bounds, unit and meaning of each, in one place.
 
 Nodes declare them, ``--help`` and the reference list them; nothing here needs ROS.
 """
@@ -99,7 +99,7 @@ class CalibrationParameters:
     )
     identify_plant: bool = parameter(
         True,
-        'whether to identify the plant of each joint from the tensions too: it tells how far the '
+        'whether to identify the plant of each joint from the tensions too: it shows how far the '
         'tube lets the tip be bent, which master and compensator keep to, and the physical modes '
         'of the compensator can be selected by it; half a second of computing',
     )
@@ -111,7 +111,7 @@ class CalibrationParameters:
 
 @dataclass(frozen=True)
 class CompensatorParameters:
-    """What the compensator can be told."""
+    """Parameters of the compensator."""
 
     mode: str = parameter(
         'bouc_wen',

@@ -28,7 +28,7 @@ def threads_of_this_process() -> frozenset[int]:
 
 def granted_priority() -> int:
     """Priority to take unasked: what the limits of this user grant, 0 for none."""
-    # Only limits tell that somebody meant it; root could have any priority.
+    # Only limits show that somebody meant it; root could have any priority.
     if resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] != resource.RLIM_INFINITY:
         return 0
     allowed = resource.getrlimit(resource.RLIMIT_RTPRIO)[0]

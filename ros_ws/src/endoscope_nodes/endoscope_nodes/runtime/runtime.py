@@ -257,9 +257,9 @@ class Announcement:
         self._logger = nodes[0].get_logger() if len(nodes) == 1 else get_logger('graph')
         for node in nodes:
             given = {**process_parameters, **node.given} if node is nodes[0] else node.given
-            told = [f'{name}:={as_typed(value)}' for name, value in given.items()]
-            if told:
-                node.get_logger().info(with_final_names(f'with {", ".join(told)}'))
+            set_to = [f'{name}:={as_typed(value)}' for name, value in given.items()]
+            if set_to:
+                node.get_logger().info(with_final_names(f'with {", ".join(set_to)}'))
         self._timer = nodes[0].create_timer(
             _LOOK_S, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
@@ -286,5 +286,5 @@ class Announcement:
         nodes, ticker = self._nodes, self._nodes[0].ticker
         pace = 'in simulated time' if ticker.simulated else f'at {ticker.rate} Hz'
         pace += ', no faster than real time' * ticker.paced
-        said = '; '.join(filter(None, (node.announcement for node in nodes)))
-        return f'ready in {nodes[0].get_namespace()} {pace}' + (f': {said}' if said else '')
+        what = '; '.join(filter(None, (node.announcement for node in nodes)))
+        return f'ready in {nodes[0].get_namespace()} {pace}' + (f': {what}' if what else '')

@@ -59,7 +59,7 @@ def senders_in_words(node: EndoscopeNode, topic: str) -> str:
 
 
 class SessionWatch:
-    """A node's part in the motion sessions of the supervisor, told on `/diagnostics`."""
+    """A node's part in the motion sessions of the supervisor, reported on `/diagnostics`."""
 
     def __init__(
         self,
@@ -72,7 +72,7 @@ class SessionWatch:
         self._session = session or MotionSession()
         self._on_enter = on_enter
         self._on_leave = on_leave
-        self._told = ('', '')
+        self._published = ('', '')
         self._streams: list[tuple[SenderWatch, Callable[[str], None]]] = []
         self._gates: list[tuple[str, CommandGate]] = []
         heartbeat = node.create_subscription(Header, MOTION_SESSION, self._hear, EVENT)
@@ -183,37 +183,37 @@ class SessionWatch:
     def leave(self, reason: str) -> None:
         """End the node's part in the session, and say so at once: the slave goes to FAULT."""
         self._session.leave(reason)
-        self.tell()
+        self.publish()
 
     def turn(self) -> None:
         """Take a turn of the node's loop; a node that beats calls this more often."""
         self._session.beat(self._node.ticker.monotonic_ns())
-        self.tell()
+        self.publish()
 
     def _hear(self, message: Header) -> None:
         doubt = self._supervisors.rivals()
         now = self._node.ticker.monotonic_ns()
         if self._session.hear(message.frame_id, now, doubt):
-            if self._told[0]:
+            if self._published[0]:
                 self._node.end_session()
-            self._told = (self._session.name, '')
+            self._state = (self._session.name, '')
             if self._on_enter is not None:
                 self._on_enter()
             return
-        self.tell()
+        self.publish()
 
-    def tell(self) -> None:
+    def publish(self) -> None:
         """Say how the node's part in the session has changed, if it has."""
-        told = (self._session.name, self._session.trouble)
-        if told == self._told:
+        state = (self._session.name, self._session.trouble)
+        if state == self._published:
             return
-        before, self._told = self._told, told
-        if before[0] and not told[0]:
+        before, self._published = self._published, state
+        if before[0] and not state[0]:
             if self._on_leave is not None:
                 self._on_leave()
             self._node.end_session()
-        if told[1]:
-            self._node.get_logger().error(told[1])
+        if state[1]:
+            self._node.get_logger().error(state[1])
         self._node.diagnostics.publish()
 
     def _report(self) -> Report:

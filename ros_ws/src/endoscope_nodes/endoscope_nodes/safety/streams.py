@@ -78,7 +78,7 @@ def _who_starves(late_ns: int) -> str:
 
 
 class CommandReport:
-    """What a command gate did, as a diagnostic report; lost commands are told with what helps."""
+    """What a command gate did, as a diagnostic report, with what helps against lost ones."""
 
     def __init__(
         self,
@@ -119,9 +119,9 @@ class CommandReport:
         if self._starved >= _STARVED_REPORTS and self._on_starved is not None:
             self._on_starved(starved)
         if fresh:
-            said = f'{fresh} of {fresh + accepted} commands refused, last: {gate.last_reason}'
+            text = f'{fresh} of {fresh + accepted} commands refused, last: {gate.last_reason}'
             # Whoever sends what is not obeyed believes that he moves something.
-            return ERROR if unheeded > accepted else WARN, said, values
+            return ERROR if unheeded > accepted else WARN, text, values
         if share < _CARRIED:
             return WARN, starved, values
         return OK, 'commands in order', values
