@@ -133,8 +133,8 @@ instrument_model = Program(
 watch = Program(
     'watch',
     'nodes.watch:WatchNode',
-    'Compares the rig with its plant while it moves, where it is switched on, and tells that it is '
-    'another one and at which stage.',
+    'Compares the rig with its plant while it moves, where it is switched on, and reports that the '
+    'rig no longer matches its plant, and where.',
 )
 recorder = Program(
     'recorder',

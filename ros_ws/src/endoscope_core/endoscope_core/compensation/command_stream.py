@@ -96,7 +96,7 @@ class CommandStream:
         self.source = Source.NOBODY
 
     def end_master(self) -> None:
-        """The clutch was let go of: whatever is commanded after it begins at the measured pose."""
+        """The clutch was released: whatever is commanded after it begins at the measured pose."""
         self.gate.reset()
         if self.source is Source.MASTER:
             self.source = Source.NOBODY

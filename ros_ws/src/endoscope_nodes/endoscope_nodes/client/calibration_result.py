@@ -86,7 +86,7 @@ def aborted_result(stamp_ns: int, reason: str, step: str, duration: float) -> Di
 def refused_result(
     stamp_ns: int, reason: str, duration: float, zeros: 'NDArray[np.float64] | None' = None
 ) -> DiagnosticArray:
-    """Say that the tube is of no class that is known, and why; ``duration`` in s."""
+    """State that the tube is outside all known classes, and why; ``duration`` in s."""
     values: dict[str, object] = {
         'class_deg': NONE_OF_THEM,
         'reason': reason,

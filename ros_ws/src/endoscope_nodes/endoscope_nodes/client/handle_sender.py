@@ -15,7 +15,7 @@ _RECEIVED = Duration(seconds=0.5)
 
 
 def handle_senders(node: Node) -> list[str]:
-    """Names of all nodes that speak for the handle, sorted; two of them would be a fault."""
+    """Names of all nodes that publish the handle topics, sorted; two of them would be a fault."""
     places = [node.resolve_topic_name(name) for name in (MASTER_MEASURED, MASTER_CLUTCH)]
     found = [info for place in places for info in node.get_publishers_info_by_topic(place)]
     return sorted({info.node_name for info in found})

@@ -203,7 +203,7 @@ class MotionPlayer:
 
         try:
             client.wait_until(lambda: publisher.get_subscription_count() > 0, PATIENCE_S)
-            # Where two have held it, nodes doubt every hand until it is let go of.
+            # Where two have held it, nodes take the clutch as released until it is.
             client.wait_until(let_go, LET_GO_S)
             yield lambda: publisher.publish(clutch_message(True, client.graph_ns))
         finally:

@@ -188,7 +188,7 @@ class MasterParameters:
     hold_to_play: bool = parameter(
         False,
         'whether a motion or file goes on only while the clutch is held, which another program '
-        'then speaks for',
+        'then publishes',
         dynamic=True,
     )
     scale: float = parameter(
@@ -209,7 +209,8 @@ class WatchParameters:
     """Parameters of the watch."""
 
     active: bool = parameter(
-        False, 'whether the rig is compared with its plant while it moves; off, it hears nothing'
+        False,
+        'whether the rig is compared with its plant while it moves; off, it subscribes to nothing',
     )
     plant: str = parameter('', 'plant.yaml that describes the rig; empty for that of the rig file')
 
@@ -268,7 +269,7 @@ class SimulationClockParameters:
 
     wait_for: tuple[str, ...] = parameter(
         (names.MOTOR_MEASURED, names.WIRES_MEASURED),
-        'topics without whose answer time never goes on',
+        'topics that the clock waits for at each tick',
         choices=FOLLOWED,
     )
     start: float = parameter(1.0, 'simulated time of the first tick', unit='s', low=0.001)

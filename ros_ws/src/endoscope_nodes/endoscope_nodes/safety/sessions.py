@@ -224,8 +224,8 @@ class SessionWatch:
 class ClutchWatch:
     """The clutch as last heard; silence counts as released.
 
-    A second sender ends the node's part in the session, and the clutch counts as released until it
-    is let go of: who held it is not known. `on_release` also comes when it is heard again.
+    A second sender ends the node's part in the session, and the clutch is treated as released
+    until it is released: who held it is not known. `on_release` also comes when it is heard again.
     """
 
     def __init__(
