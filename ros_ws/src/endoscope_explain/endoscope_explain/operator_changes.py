@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol
 
-from endoscope_core.physics.description import EffectSpec, PlantDescription
+from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.design import Asking
 from endoscope_explain.prediction_set import SOMETHING_ELSE
 
@@ -34,12 +34,12 @@ class Change:
 
 
 def weighted(plant: PlantDescription, joint: str) -> PlantDescription:
-    """The plant with a weight at the tip of a joint's section, which hangs down when straight."""
-    hung = [e for e in plant.effects if (e.id, e.joint) == ('gravity', joint)]
-    numbers = dict(hung[0].parameters) if hung else {'phase_rad': 0.0}
-    numbers['moment_nm'] = numbers.get('moment_nm', 0.0) + WEIGHT_NM
-    others = tuple(e for e in plant.effects if e not in hung)
-    return replace(plant, effects=(*others, EffectSpec('gravity', joint, numbers)))
+    """The plant with a weight at the tip of a joint's section, which lies horizontally."""
+    # A constant moment over the stiffness is a shift of the rest angle; the moment of a weight
+    # that hangs is constant to first order of the bend.
+    numbers = plant.joints[joint]
+    rest = numbers.joint_rest_angle + WEIGHT_NM / numbers.joint_stiffness
+    return replace(plant, joints={**plant.joints, joint: replace(numbers, joint_rest_angle=rest)})
 
 
 def bent_more(plant: PlantDescription, joint: str) -> PlantDescription:
@@ -50,7 +50,7 @@ def bent_more(plant: PlantDescription, joint: str) -> PlantDescription:
 
 
 CHANGES = (
-    Change('a weight of 5 g at the tip, 30 mm from the joint', 2, weighted),
+    Change('a weight of 5 g at the horizontal tip, 30 mm from the joint', 2, weighted),
     Change('a tube bent half as much again', 3, bent_more, 'capstan_exponent'),
 )
 

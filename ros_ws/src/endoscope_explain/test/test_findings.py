@@ -11,7 +11,7 @@ from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.audit.auditing import KINDS
 from endoscope_explain.audit.findings import (
-    clock_skew,
+    clock_rate,
     earlier_motion,
     frozen,
     held_pose,
@@ -23,7 +23,7 @@ from endoscope_explain.audit.findings import (
     stamp_jitter,
     stamp_order,
     stamp_unit,
-    tracker_outliers,
+    stray_poses,
 )
 
 PLANT = PlantDescription()
@@ -121,7 +121,7 @@ FAULTS = {
     stamp_order.REPEATED: taken(np.sort(np.r_[np.arange(480), np.arange(100, 140)]), 'bending'),
     stamp_unit.KIND: timed(lambda time: 1e3 * time),
     stamp_jitter.KIND: timed(off_by_jitter, 'bending'),
-    clock_skew.KIND: received_with_a_fast_tracker,
+    clock_rate.KIND: received_with_a_fast_tracker,
     missing_samples.MISSING: without_a_second,
     missing_samples.PAUSED: lambda sound: without_a_second(sound, lost=np.zeros(480, int)),
     frozen.KIND: read(put(standing), 'bending'),
@@ -139,7 +139,7 @@ FAULTS = {
     load_cells.SATURATED: read(put(lambda values: np.minimum(values, 9.0)), 'tension'),
     held_samples.KIND: read(put(standing, 3000, 3030, 0, 1), 'tension'),
     held_samples.LONG: read(put(standing, 3000, 3400, 0, 1), 'tension'),
-    tracker_outliers.KIND: read(
+    stray_poses.KIND: read(
         put(lambda values: values + np.where(np.arange(480) % 50 == 20, 0.2, 0.0), 0, None, 1),
         'bending',
     ),

@@ -6,7 +6,7 @@ from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit.examined import Examined
 from endoscope_explain.audit.finding import AuditReport, FindingKind, Severity
 from endoscope_explain.audit.findings import (
-    clock_skew,
+    clock_rate,
     earlier_motion,
     frozen,
     held_pose,
@@ -18,7 +18,7 @@ from endoscope_explain.audit.findings import (
     stamp_jitter,
     stamp_order,
     stamp_unit,
-    tracker_outliers,
+    stray_poses,
 )
 from endoscope_explain.recording import Recording
 
@@ -34,7 +34,7 @@ STEPS: tuple[Step, ...] = (
     stamp_order,
     stamp_unit,
     stamp_jitter,
-    clock_skew,
+    clock_rate,
     missing_samples,
     frozen,
     misread,
@@ -42,7 +42,7 @@ STEPS: tuple[Step, ...] = (
     held_pose,
     load_cells,
     held_samples,
-    tracker_outliers,
+    stray_poses,
     earlier_motion,
 )
 """Each needs what those before it have put right."""
