@@ -254,6 +254,16 @@ def test_health_of_another_rig_is_not_ours():
             assert graph.command('enable') == 'ENABLED'
 
 
+def test_a_session_that_ends_before_the_nodes_next_turn_is_left():
+    with run() as graph:
+        session = graph.nodes['calibration']._session
+        left = []
+        session._on_leave = lambda: left.append(session.name)
+        for heartbeat in ('session-of-a-moment', ''):
+            session._hear(Header(frame_id=heartbeat))
+        assert left == ['']
+
+
 # ---- nodes that vanish and come back
 
 

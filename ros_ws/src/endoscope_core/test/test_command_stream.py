@@ -120,8 +120,8 @@ def test_what_the_tube_does_not_allow_is_cut_and_reported_once():
     for k in range(500):
         slave.command(0.001 * k)
     assert slave.shafts[0] == pytest.approx(0.1 * GEAR, abs=0.01)
-    assert slave.stream.cut.report(ranges).endswith('more was asked for')
-    assert slave.stream.cut.report(ranges) == ''
+    assert slave.stream.cut.report().endswith('more was asked for')
+    assert slave.stream.cut.report() == ''
 
 
 def test_a_correction_is_added_and_leaves_without_a_jump():

@@ -109,7 +109,7 @@ def test_it_keeps_to_the_range_of_the_tube():
     master.motion.ranges = (BendingRange(-0.6, 0.6),) * 2
     way = master.go_on(2_000)
     assert way.max() == pytest.approx(0.6, abs=0.01)
-    assert master.motion.cut.report(master.motion.ranges).endswith('asked for')
+    assert master.motion.cut.report().endswith('asked for')
 
 
 @pytest.mark.parametrize('hold', [False, True])

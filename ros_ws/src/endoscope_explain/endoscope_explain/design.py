@@ -18,24 +18,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.effects import KNOWN
 from endoscope_core.physics.simulator import TICK
 from endoscope_core.signals.command_file import JOINTS
 from endoscope_core.workers import parallel_map
 from endoscope_explain.case import ExplainedCase, NextExperiment
 from endoscope_explain.experiment_motions import SMALLEST, Segment, library
 from endoscope_explain.explanation import NamedEffect
-from endoscope_explain.fit.free_parameters import LEAD, effect_parameters, nominal_parameters
-from endoscope_explain.fit.model import JointModel, jacobian, packed_joint
+from endoscope_explain.fit.model import JointModel, jacobian
 from endoscope_explain.imagined_motion import answer_to, is_safe
-from endoscope_explain.observe.observation import (
-    JointObservation,
-    commanded,
-    observe,
-    with_held_noise,
-)
+from endoscope_explain.observe.observation import JointObservation, commanded
 from endoscope_explain.observe.revisits import newly_visited
-from endoscope_explain.open_questions import OpenQuestion, fitted_laws, open_questions
-from endoscope_explain.prediction_set import SOMETHING_ELSE, Contest
+from endoscope_explain.open_questions import (
+    OpenQuestion,
+    coordinates,
+    fitted_laws,
+    free_numbers,
+    observed,
+    open_questions,
+)
+from endoscope_explain.prediction_set import NOTHING, OTHER_NUMBERS, SOMETHING_ELSE, Contest
 from endoscope_explain.recording import Recording
 
 Array = NDArray[np.float64]
@@ -93,44 +95,35 @@ class _Law:
 
     @property
     def noise(self) -> dict[str, float]:
-        """Noise (rms) of the recordings by signal, in its unit."""
-        channels = self.model.observation.channels
-        return {c.signal: float(np.sqrt(np.mean(c.noise**2))) for c in channels}
-
-    @property
-    def theta(self) -> Array:
-        """Coordinates (n,) of its numbers."""
-        base = self.model.base
-        free = self.model.free
-        return np.array(
-            [i.coordinate(1.0 if i.index == LEAD else float(base[i.index])) for i in free]
-        )
+        """Noise of the recordings by signal, in its unit by the root of the samples in a s."""
+        seen = self.model.observation
+        return {
+            c.signal: float(np.sqrt(np.mean(c.noise**2) * seen.duration / len(c.time)))
+            for c in seen.channels
+        }
 
     def once(self, changed: Callable[[PlantDescription], PlantDescription], unknown: str) -> '_Law':
         """The law of a rig that was changed, of which one number is not known any more."""
-        plant = changed(self.plant)
-        base, flags = packed_joint(plant, self.model.observation.joint)
-        free, known = self.model.free, self.precision.copy()
+        plant, known = changed(self.plant), self.precision.copy()
+        base, flags, free = free_numbers(plant, self.model.observation.joint)
         for k, item in enumerate(free):
             if item.name == unknown:
+                # What the others are known to once that one may be anything (Schur complement).
+                known -= np.outer(known[k], known[k]) / known[k, k]
                 known[k, :] = known[:, k] = 0.0
                 known[k, k] = self.model.prior_weight()[k] ** 2 + _UNBOUNDED
-        return replace(
-            self, plant=plant, model=replace(self.model, base=base, flags=flags), precision=known
-        )
+        model = replace(self.model, base=base, flags=flags, free=free)
+        return replace(self, plant=plant, model=model, precision=known)
 
     def slopes(self, observation: JointObservation) -> Array:
         """Derivatives (size, n) of what it reads in another motion, in noise units."""
-        return jacobian(replace(self.model, observation=observation), self.theta)
+        at = coordinates(self.model.base, self.model.free)
+        return jacobian(replace(self.model, observation=observation), at)
 
 
 def _law(recording: Recording, plant: PlantDescription, joint: str) -> _Law:
-    base, flags = packed_joint(plant, joint)
-    free = nominal_parameters(base)
-    for spec in plant.effects:
-        if spec.joint == joint:
-            free += effect_parameters(spec.id)
-    seen = next(o for o in with_held_noise(observe(recording, plant)) if o.joint == joint)
+    base, flags, free = free_numbers(plant, joint)
+    seen = observed(recording, plant, joint)
     law = _Law(plant, JointModel(seen, base, flags, free), np.empty((0, 0)))
     slopes = law.slopes(seen)
     prior = np.diag(law.model.prior_weight() ** 2 + _UNBOUNDED)
@@ -168,7 +161,7 @@ class Asking:
     recording: Recording
     question: OpenQuestion
     laws: Mapping[str, _Law]
-    noise: Mapping[str, float] = field(repr=False)  # of the recordings (rms), by signal
+    noise: Mapping[str, float] = field(repr=False)  # of the recordings; see `_Law.noise`
 
     @staticmethod
     def of(case: ExplainedCase, question: OpenQuestion) -> 'Asking':
@@ -178,9 +171,10 @@ class Asking:
             for name, plant in fitted_laws(case, question).items()
         }
         noise = next(iter(laws.values())).noise if laws else {}
-        # What could not be simulated has no name as far as motions go.
         chances = {n: p for n, p in question.chances.items() if n in laws}
-        unnamed = sum(p for n, p in question.chances.items() if n not in laws)
+        # What no plant can have has no name as far as motions go.
+        tried = {*KNOWN, NOTHING, OTHER_NUMBERS, *laws}
+        unnamed = sum(p for n, p in question.chances.items() if n not in tried)
         if unnamed > 0.0:
             chances[SOMETHING_ELSE] = unnamed
         return Asking(case.recording, replace(question, chances=chances), laws, noise)
@@ -224,7 +218,7 @@ class Asking:
     def seen(self, full: Segment) -> tuple[Segment, dict[str, JointObservation]]:
         """A motion as large as is safe by all laws, and what each reads; empty where none is."""
         limits = _limits(self.recording)
-        size = 1.0
+        size = 1.0 if limits is not None else 0.0
         while size >= SMALLEST:
             segment = replace(full, angle=size * full.angle)
             answers = {}
@@ -233,7 +227,7 @@ class Asking:
                 imagined = answer_to(
                     plant, segment.name, segment.time, segment.angle, self.recording.rig
                 )
-                if not is_safe(imagined, *limits):
+                if limits is None or not is_safe(imagined, *limits):
                     break
                 answers[name] = self._observed(imagined, plant)
             else:
@@ -243,13 +237,12 @@ class Asking:
 
     def _observed(self, imagined: Recording, plant: PlantDescription) -> JointObservation:
         """What a joint reads in an imagined motion, with the noise of the recordings."""
-        if self.recording.tension is None:
-            imagined = replace(imagined, tension=None)
-        own = next(o for o in observe(imagined, plant) if o.joint == self.question.joint)
+        own = observed(imagined, plant, self.question.joint)
+        rates = {c.signal: len(c.time) / own.duration for c in own.channels}
         channels = tuple(
-            replace(c, noise=np.full_like(c.noise, self.noise[c.signal]))
+            replace(c, noise=np.full_like(c.noise, self.noise[name] * math.sqrt(rates[name])))
             for c in own.channels
-            if c.signal in self.noise
+            if (name := c.signal) in self.noise
         )
         return replace(own, channels=channels)
 
@@ -285,26 +278,34 @@ class Asking:
 
 
 def _rms(apart: Mapping[tuple[str, str], float], answers: Mapping[str, JointObservation]) -> float:
-    """The least evidence as a distance in noise units (rms)."""
-    return math.sqrt(2.0 * min(apart.values()) / max(o.size for o in answers.values()))
+    """The least evidence between laws that have a name, as a distance in noise units (rms)."""
+    named = [nats for pair, nats in apart.items() if SOMETHING_ELSE not in pair]
+    return math.sqrt(2.0 * min(named, default=0.0) / max(o.size for o in answers.values()))
 
 
 def _within(recording: Recording, joint: str) -> tuple[Segment, ...]:
-    """Motions of a joint as large as those that were recorded."""
-    j = recording.joints.index(joint)
-    reach = float(np.abs(recording.command.values[:, j]).max()) / recording.gear
-    return library(joint, recording.joints, round(reach, 3), recording.rig)
+    """Motions of a joint, each joint as far as it was commanded."""
+    most = np.abs(recording.command.values).max(axis=0) / recording.gear
+    reaches = tuple(zip(recording.joints, np.round(most, 3).tolist(), strict=True))
+    return library(joint, reaches, recording.rig)
 
 
-def _limits(recording: Recording) -> tuple[float, float, float]:
-    """Largest tension in N and angle in rad, and least tension, that the rig has been through."""
-    tension, slack = recording.rig.tension.calibration_ceiling, 0.0
-    if recording.tension is not None:
-        seen = recording.tension.values[recording.tension.valid]
-        tension = min(tension, MARGIN * float(seen.max()))
-        slack = float(seen.min()) / MARGIN
-    bending = MARGIN * float(np.abs(recording.bending.values[recording.bending.valid]).max())
-    return tension, bending, slack
+def _limits(recording: Recording) -> tuple[Array, Array, Array] | None:
+    """What the rig has been through: tensions (J, 2) in N, angles (J,) in rad, least tensions.
+
+    None where a joint was never seen.
+    """
+    seen = recording.bending
+    if not np.all(np.any(seen.valid, axis=0)):
+        return None
+    bending = MARGIN * np.max(np.abs(seen.values), axis=0, where=seen.valid, initial=0.0)
+    ceiling = np.full((len(recording.joints), 2), recording.rig.tension.calibration_ceiling)
+    wires = recording.tension
+    if wires is None or not np.all(np.any(wires.valid, axis=0)):
+        return ceiling, bending, np.zeros_like(ceiling)
+    most = np.max(wires.values, axis=0, where=wires.valid, initial=0.0)
+    least = np.min(wires.values, axis=0, where=wires.valid, initial=np.inf)
+    return np.minimum(ceiling, MARGIN * most), bending, np.maximum(least, 0.0)
 
 
 def _experiment(

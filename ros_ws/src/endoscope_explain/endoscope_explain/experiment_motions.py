@@ -22,6 +22,10 @@ SIZES = (1.0, 0.5)
 """Shares of a joint's reach at which a motion is on offer."""
 RISE_S = 0.4
 """Of a step: about as quick as the rig of the package may be over its whole reach."""
+LEAST_REACH = 0.05
+"""Of a joint, rad: one that was moved by less was hardly moved."""
+AT_REST = 0.01
+"""Of zero, rad, where a motion ends."""
 SMALLEST = 0.3
 """Of its size, a motion that is not safe is made smaller to."""
 
@@ -63,27 +67,33 @@ def as_played(time: Array, angle: Array, rig: Rig, tick: float = TICK) -> tuple[
 
 # The same for every question about a rig.
 @lru_cache(maxsize=32)
-def library(joint: str, joints: tuple[str, ...], reach: float, rig: Rig) -> tuple[Segment, ...]:
-    """Motions of one of a rig's joints up to `reach` rad, as the rig plays them, by size.
+def library(joint: str, reaches: tuple[tuple[str, float], ...], rig: Rig) -> tuple[Segment, ...]:
+    """Motions of one of a rig's joints, each up to its reach in rad, as the rig plays them.
 
-    Where there are two joints, the other one is moved alone, too, and stands bent meanwhile.
+    Where there are two joints that move, the other one is moved alone, too, and stands bent
+    meanwhile. Empty where the joint hardly moves; motions that the rig is too slow for are left
+    out.
     """
+    joints, most = tuple(name for name, _ in reaches), dict(reaches)
+    if most[joint] < LEAST_REACH:
+        return ()
     found = []
     for size in SIZES:
         of_size = '' if size == 1.0 else f' of {size:.0%}'
-        for signal in _signals(size * reach):
+        for signal in _signals(size * most[joint]):
             found.append(_played(f'{signal.name}{of_size}', joint, {joint: signal}, joints, rig))
-        for other in (name for name in joints if name != joint):
-            alone = {other: multisine(size * reach, 6.0)}
+        for other in (name for name in joints if name != joint and most[name] >= LEAST_REACH):
+            angle = size * most[other]
+            alone = {other: multisine(angle, 6.0)}
             found.append(_played(f'{other} alone{of_size}', other, alone, joints, rig))
-            stroke = _stroke('', size * reach, 3.0)
+            stroke = _stroke('', size * most[joint], 3.0)
             begun = [hold(1.0), stroke, hold(1.0)]
             bent = sequence(
-                '', [move(0.0, reach, 1.0), hold(stroke.duration, reach), move(reach, 0.0, 1.0)]
+                '', [move(0.0, angle, 1.0), hold(stroke.duration, angle), move(angle, 0.0, 1.0)]
             )
             beside = {joint: sequence('', begun), other: bent}
             found.append(_played(f'stroke beside {other}{of_size}', joint, beside, joints, rig))
-    return tuple(found)
+    return tuple(each for each in found if np.all(np.abs(each.angle[-1]) < AT_REST))
 
 
 def _signals(reach: float) -> Iterator[Signal]:
@@ -94,13 +104,14 @@ def _signals(reach: float) -> Iterator[Signal]:
     for side, way in (('positive', reach), ('negative', -reach)):
         rests = [move(0.0, way, 1.0), hold(5.0, way), move(way, 0.0, 1.0)]
         yield sequence(f'{side} hold', rests)
-        inner = [way, way - np.sign(way) * LOOP]
+        inner = [way, way - np.sign(way) * min(LOOP, abs(reach))]
         loops = ramps((0.0, inner[0], inner[1], inner[0], inner[1], 0.0), abs(reach))
         yield sequence(f'{side} loops', [loops])
         yield sequence(
             f'{side} steps', [steps_with_holds((0.4 * way, way, 0.6 * way), RISE_S, 0.8)]
         )
-    yield sequence('loops around zero', [ramps((0.0, LOOP, -LOOP, LOOP, -LOOP, 0.0), abs(reach))])
+    small = min(LOOP, reach)
+    yield sequence('loops around zero', [ramps((0.0, small, -small, small, -small, 0.0), reach)])
     yield sequence('steps', [steps_with_holds((reach, -0.4 * reach, 0.3 * reach, -reach), RISE_S)])
     yield sequence('chirp', [chirp(0.7 * reach, 5.0, 0.3, 5.0)])
     yield sequence('multisine', [multisine(reach, 6.0)])
@@ -145,4 +156,6 @@ def _played(
     time = np.arange(0.0, end + 0.5 * SAMPLE_S, SAMPLE_S)
     still = np.zeros_like(time)
     columns = [signals[each](time)[0] if each in signals else still for each in joints]
-    return Segment(name, joint, *as_played(time, np.stack(columns, axis=1), rig, SAMPLE_S))
+    # Longer steps are ten times less work, where the rig does not take them for a stall.
+    tick = SAMPLE_S if rig.joints.entry_step / rig.joints.speed >= SAMPLE_S else TICK
+    return Segment(name, joint, *as_played(time, np.stack(columns, axis=1), rig, tick))

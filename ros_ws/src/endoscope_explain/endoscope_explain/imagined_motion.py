@@ -34,12 +34,18 @@ def answer_to(plant: PlantDescription, name: str, time: Array, angle: Array, rig
 
 
 def is_safe(
-    recording: Recording, tension_limit: float, bending_limit: float, slack_limit: float = 0.0
+    recording: Recording,
+    tension_limit: float | Array,
+    bending_limit: float | Array,
+    slack_limit: float | Array = 0.0,
 ) -> bool:
-    """Tell whether an imagined motion stays within tensions in N and an angle in rad."""
+    """Whether an imagined motion stays within tensions in N and angles in rad.
+
+    Limits are of all, or of each joint (J,) and its two wires (J, 2).
+    """
     assert recording.tension is not None
     return bool(
-        recording.tension.values.max() <= tension_limit
-        and recording.tension.values.min() >= slack_limit
-        and np.abs(recording.bending.values).max() <= bending_limit
+        np.all(recording.tension.values <= tension_limit)
+        and np.all(recording.tension.values >= slack_limit)
+        and np.all(np.abs(recording.bending.values) <= bending_limit)
     )

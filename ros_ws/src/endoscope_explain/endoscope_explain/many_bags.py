@@ -213,4 +213,4 @@ def _as_they_come(
     with worker_pool(min(jobs, len(sources))) as pool:
         futures = {pool.submit(explained_case, one): i for i, one in enumerate(sources)}
         for future in as_completed(futures):
-            yield futures[future], future.result()
+            yield futures.pop(future), future.result()

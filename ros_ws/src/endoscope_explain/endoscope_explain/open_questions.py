@@ -1,20 +1,37 @@
 """What an answer leaves open, and each law that it may be, fitted to the recordings."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.effects import KNOWN, describe
+from endoscope_core.physics.layout import OUT_JOINT
 from endoscope_core.physics.packing import without_functions
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.decide.conclusions import spec_of
 from endoscope_explain.explanation import NamedEffect
-from endoscope_explain.fit.free_parameters import LEAD, effect_parameters, nominal_parameters
-from endoscope_explain.fit.model import Fit, JointModel, fit, joint_of, packed_joint
-from endoscope_explain.observe.observation import JointObservation, observe
+from endoscope_explain.fit.free_parameters import (
+    BAND,
+    LEAD,
+    FreeParameter,
+    effect_parameters,
+    nominal_parameters,
+)
+from endoscope_explain.fit.model import (
+    Array,
+    Fit,
+    Flags,
+    JointModel,
+    fit,
+    joint_of,
+    packed_joint,
+    simulate_joint,
+)
+from endoscope_explain.fit.nominal import with_any_numbers
+from endoscope_explain.observe.observation import JointObservation, observe, with_held_noise
 from endoscope_explain.prediction_set import NOTHING, OTHER_NUMBERS, SOMETHING_ELSE, Contest
 from endoscope_explain.recording import Recording
 from endoscope_explain.search.screen import background, directions, screened
@@ -24,8 +41,6 @@ MOST_LAWS = 3
 """Of a question that are fitted: the likeliest."""
 _LEAST = 1e-9
 """Probability below which one does not matter."""
-BAND = 0.2
-"""Relative freedom of the nominal numbers beside a law that is fitted anew."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +108,7 @@ def fitted_laws(case: ExplainedCase, question: OpenQuestion) -> dict[str, PlantD
 
     Without what was named there is nothing to compare: empty where the improved plant lacks it.
     """
-    recording, plant = case.recording, case.explanation.augmented
+    plant = case.explanation.augmented
     named, joint = next(iter(question.chances)), question.joint
     there = {spec.id for spec in plant.effects if spec.joint == joint}
     if question.effect is not None and named not in there:
@@ -102,29 +117,53 @@ def fitted_laws(case: ExplainedCase, question: OpenQuestion) -> dict[str, PlantD
     for name in (n for n in question.chances if n not in {named, SOMETHING_ELSE, *there}):
         if len(laws) == MOST_LAWS:
             break
-        law = _law(recording, case.explanation.nominal, plant, question, name)
+        law = _law(case, question, name)
         if law is not None:
             laws[name] = law
     return laws
 
 
-def _law(
-    recording: Recording,
-    described: PlantDescription,
-    plant: PlantDescription,
-    question: OpenQuestion,
-    name: str,
-) -> PlantDescription | None:
+def _law(case: ExplainedCase, question: OpenQuestion, name: str) -> PlantDescription | None:
     """The plant with another law in the place of what was named; None where it cannot have it."""
-    joint = question.joint
+    joint, plant = question.joint, case.explanation.augmented
     if question.effect is not None:
         bare = without(plant, question.effect)
     else:
-        bare = replace(plant, joints={**plant.joints, joint: described.joints[joint]})
-    if name in (NOTHING, OTHER_NUMBERS):
-        observation = next(o for o in observe(recording, bare) if o.joint == joint)
-        return with_fit(bare, joint, refit(bare, observation, 6))
-    return with_effect(recording, bare, joint, name) if name in KNOWN else None
+        described = case.explanation.nominal.joints[joint]
+        bare = replace(plant, joints={**plant.joints, joint: described})
+    observation = observed(case.recording, bare, joint)
+    if name in KNOWN:
+        return with_effect(bare, observation, name, case.band)
+    if name not in (NOTHING, OTHER_NUMBERS):
+        return None
+    fitted = refit(bare, observation, 6, case.band)
+    return with_fit(bare, joint, fitted if name == NOTHING else with_any_numbers(fitted))
+
+
+def observed(recording: Recording, plant: PlantDescription, joint: str) -> JointObservation:
+    """What one joint reads, beside the angle that the plant gives the other one."""
+    seen = {each.joint: each for each in with_held_noise(observe(recording, plant))}
+    own = seen.pop(joint)
+    for other in seen.values():
+        own = own.beside(simulate_joint(other, *packed_joint(plant, other.joint))[:, OUT_JOINT])
+    return own
+
+
+def free_numbers(
+    plant: PlantDescription, joint: str, band: float = BAND
+) -> tuple[Array, Flags, tuple[FreeParameter, ...]]:
+    """Packed parameters and flags of a joint of a plant, and what is free: its effects', too."""
+    base, flags = packed_joint(plant, joint)
+    free = nominal_parameters(base, band)
+    for spec in plant.effects:
+        if spec.joint == joint:
+            free += effect_parameters(spec.id)
+    return base, flags, free
+
+
+def coordinates(base: Array, free: Sequence[FreeParameter]) -> Array:
+    """Coordinates (n,) of free numbers where the packed ones are."""
+    return np.array([i.coordinate(1.0 if i.index == LEAD else float(base[i.index])) for i in free])
 
 
 def without(plant: PlantDescription, effect: NamedEffect) -> PlantDescription:
@@ -134,16 +173,13 @@ def without(plant: PlantDescription, effect: NamedEffect) -> PlantDescription:
     return without_functions(replace(plant, effects=others), effect.joint, places)
 
 
-def refit(plant: PlantDescription, observation: JointObservation, iterations: int) -> Fit:
+def refit(
+    plant: PlantDescription, observation: JointObservation, iterations: int, band: float
+) -> Fit:
     """Refit one joint of a plant, its effects included, from where it is."""
-    base, flags = packed_joint(plant, observation.joint)
-    free = nominal_parameters(base, BAND)
-    for spec in plant.effects:
-        if spec.joint == observation.joint:
-            free += effect_parameters(spec.id)
-    start = [i.coordinate(1.0 if i.index == LEAD else float(base[i.index])) for i in free]
+    base, flags, free = free_numbers(plant, observation.joint, band)
     model = JointModel(observation, base, flags, free)
-    return fit(model, np.array(start), iterations=iterations)
+    return fit(model, coordinates(base, free), iterations=iterations)
 
 
 def with_fit(plant: PlantDescription, joint: str, found: Fit) -> PlantDescription:
@@ -157,17 +193,16 @@ def with_fit(plant: PlantDescription, joint: str, found: Fit) -> PlantDescriptio
 
 
 def with_effect(
-    recording: Recording, bare: PlantDescription, joint: str, name: str
+    bare: PlantDescription, observation: JointObservation, name: str, band: float
 ) -> PlantDescription | None:
-    """Fit an effect that a plant has not; None where nothing of it shows."""
-    observation = next(o for o in observe(recording, bare) if o.joint == joint)
-    behind = background(refit(bare, observation, 2))
+    """Fit an effect that a plant has not to one joint; None where nothing of it shows."""
+    behind = background(refit(bare, observation, 2, band))
     terms = tuple(Term(describe(name), start) for start in starting_points(describe(name)))
     ways = directions(behind, terms, 1)
     if not ways:
         return None
     # Beside numbers that are bent by what was taken out, a law may gain nothing at its starts.
     ranked = screened(behind, ways) or [ways[0].term]
-    packed = ranked[0].added_to(behind.fit.model).base
+    packed, joint = ranked[0].added_to(behind.fit.model).base, observation.joint
     term = replace(bare, effects=(*bare.effects, spec_of(describe(name), joint, packed)))
-    return with_fit(term, joint, refit(term, observation, 6))
+    return with_fit(term, joint, refit(term, observation, 6, band))

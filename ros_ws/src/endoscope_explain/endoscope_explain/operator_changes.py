@@ -6,7 +6,7 @@ from functools import partial
 from typing import Protocol
 
 from endoscope_core.physics.description import PlantDescription
-from endoscope_explain.design import Asking
+from endoscope_explain.design import LEAST_NATS, Asking
 from endoscope_explain.prediction_set import SOMETHING_ELSE
 
 WEIGHT_NM = 9.81 * 0.005 * 0.03
@@ -62,10 +62,13 @@ def what_would_decide(asked: Sequence[Asking], jobs: int = 1) -> str:
             continue
         joint = asking.question.joint
         names = ' and '.join(name for name in asking.question.chances if name != SOMETHING_ELSE)
+        unchanged = asking.best(jobs, ())
+        least = LEAST_NATS + (0.0 if unchanged is None else unchanged.nats)
         for change in CHANGES:
             changed = partial(change.changed, joint=joint)
             best = asking.once(changed, change.unknown).best(jobs, ())
-            if best is not None:
+            # What a motion is expected to bring without the change is not due to it.
+            if best is not None and best.nats >= least:
                 return (
                     f'{change.words.capitalize()} would distinguish {names} '
                     f'({best.segment.name}, {best.nats:.0f} nats; about {change.minutes} min of '

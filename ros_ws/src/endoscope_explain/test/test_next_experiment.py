@@ -5,15 +5,17 @@ import pytest
 
 from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
 from endoscope_core.rig import shipped_rig
-from endoscope_explain import design
+from endoscope_explain import design, operator_changes
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.design import Asking, propose, what_is_asked
 from endoscope_explain.experiment_motions import library
 from endoscope_explain.explanation import Explanation, NamedEffect, Verdict
 from endoscope_explain.imagined_motion import answer_to, is_safe
+from endoscope_explain.observe.observation import commanded
+from endoscope_explain.observe.revisits import newly_visited
 from endoscope_explain.open_questions import OpenQuestion, fitted_laws, open_questions
-from endoscope_explain.operator_changes import CHANGES, what_would_decide
+from endoscope_explain.operator_changes import Change, what_would_decide
 from endoscope_explain.prediction_set import OTHER_NUMBERS, SOMETHING_ELSE, Contest
 
 ONE = PlantDescription({'bend_x': JointParameters()})
@@ -37,15 +39,16 @@ def contest(*names, **changed):
 
 def case_of(recording, plant, *names, **changed):
     """A case in which the first of some names is said, and all are left open."""
-    audit = audit_recording(recording, ONE)
+    described = PlantDescription({joint: JointParameters() for joint in recording.joints})
+    audit = audit_recording(recording, described)
     tried = contest(*names, **changed)
     effect = NamedEffect(names[0], 'bend_x', {}, tried.alternatives(names[0]), contest=tried)
     explanation = Explanation(
         verdict=Verdict.MISSING_PHYSICS,
         effects=(effect,),
         parameters={},
-        nominal=ONE,
-        refitted=ONE,
+        nominal=described,
+        refitted=described,
         augmented=plant,
         fit={},
     )
@@ -78,8 +81,12 @@ def asking(late_case):
     return Asking.of(late_case, question)
 
 
-def motion(name, reach=1.0, joints=('bend_x',)):
-    (found,) = (m for m in library('bend_x', joints, reach, RIG) if m.name == name)
+def motions_to(*reaches, rig=RIG):
+    return library('bend_x', tuple(zip(JOINTS, reaches, strict=False)), rig)
+
+
+def motion(name, *reaches):
+    (found,) = (m for m in motions_to(*(reaches or (1.0,))) if m.name == name)
     return found
 
 
@@ -88,17 +95,33 @@ def apart(asking, name):
     return asking._apart(segment, answers, refitted=True)  # noqa: SLF001
 
 
-@pytest.mark.parametrize('joints', [('bend_x',), JOINTS])
-def test_every_motion_is_short_begins_and_ends_at_rest_and_is_within_the_rigs_limits(joints):
-    motions = library('bend_x', joints, 1.0, RIG)
+@pytest.mark.parametrize('reaches', [(1.0,), (1.0, 0.4)])
+def test_every_motion_is_short_begins_and_ends_at_rest_and_is_within_the_rigs_limits(reaches):
+    motions = motions_to(*reaches)
     assert len({m.name for m in motions}) == len(motions) >= 30
     for each in motions:
-        assert each.angle.shape == (len(each.time), len(joints))
+        assert each.angle.shape == (len(each.time), len(reaches))
         assert np.abs(each.angle[[0, -1]]).max() < 2e-3
         assert 2.0 < each.duration < 12.0
-        assert 0.0 < np.abs(each.angle).max() <= 1.0 + 1e-9
+        assert np.abs(each.angle).max() > 0.0
+        assert np.all(np.abs(each.angle).max(axis=0) <= np.array(reaches) + 1e-9)
         speed = np.diff(each.angle, axis=0) / np.diff(each.time)[:, None]
         assert np.abs(speed).max() <= 1.01 * RIG.joints.speed
+
+
+def test_a_joint_that_hardly_moved_is_asked_for_nothing():
+    assert motions_to(0.01, 1.0) == ()
+    alone = {m.name for m in motions_to(1.0)}
+    assert {m.name for m in motions_to(1.0, 0.01)} == alone
+    assert {m.joint for m in motions_to(1.0, 1.0)} == set(JOINTS)
+
+
+def test_small_motions_are_as_short_and_a_rig_of_small_steps_makes_them_in_full():
+    assert max(m.duration for m in motions_to(0.06)) < 12.0
+    joints = dataclasses.replace(RIG.joints, entry_step=0.05, speed=7.0)
+    motions = motions_to(1.0, rig=dataclasses.replace(RIG, joints=joints))
+    stroke = next(m for m in motions if m.name == 'slow stroke')
+    assert np.abs(stroke.angle).max() == pytest.approx(1.0, abs=0.01)
 
 
 def test_a_law_is_no_distance_from_itself(late_case, asking):
@@ -155,7 +178,7 @@ def test_no_motion_decides_more_per_second_than_the_proposed_one(late_case, aski
 
     recorded = late_case.recording
     reach = np.abs(recorded.command.values).max() / recorded.gear
-    motions = library('bend_x', recorded.joints, round(float(reach), 3), recorded.rig)
+    motions = motions_to(round(float(reach), 3), rig=recorded.rig)
     best = max(motions, key=per_second)
     assert proposed.waveform == best.name
 
@@ -211,9 +234,10 @@ def test_for_a_law_of_no_name_a_motion_is_asked_for_that_was_never_made(late_cas
     asking = Asking.of(late_case, dataclasses.replace(question, chances=unnamed))
     best = asking.best(1, ())
     assert asking._newly_visited(best.segment) > 0.5  # noqa: SLF001
-    # What was just made is not new any more.
-    made = asking._newly_visited(motion('stroke', 0.9))  # noqa: SLF001
-    assert made < 0.1
+    # What was made is not new any more.
+    made = commanded(late_case.recording)[:, 0] / late_case.recording.gear
+    assert newly_visited(made, made) == 0.0
+    assert newly_visited(made, 0.5 * made) > 0.5
 
 
 def test_evidence_is_weighed_by_probabilities_and_read_at_the_temperature():
@@ -228,8 +252,68 @@ def test_evidence_is_weighed_by_probabilities_and_read_at_the_temperature():
 
 
 def test_where_no_motion_decides_an_operator_may(asking, monkeypatch):
-    assert what_would_decide([asking]).split(' would distinguish ')[0].lower() in {
-        change.words.lower() for change in CHANGES
-    }
-    monkeypatch.setattr(design, 'LEAST_NATS', 1e9)
-    assert what_would_decide([asking]).startswith('Neither a weight of 5 g')
+    monkeypatch.setattr(
+        operator_changes, 'CHANGES', (Change('nothing', 1, lambda plant, joint: plant),)
+    )
+    assert what_would_decide([asking]).startswith('Neither nothing would distinguish')
+
+
+def stiffer(plant, joint):
+    numbers = plant.joints[joint]
+    more = dataclasses.replace(numbers, wire_stiffness=3.0 * numbers.wire_stiffness)
+    return dataclasses.replace(plant, joints={**plant.joints, joint: more})
+
+
+def test_a_change_is_credited_with_what_it_adds_alone(asking, monkeypatch):
+    monkeypatch.setattr(operator_changes, 'CHANGES', (Change('stiffer wires', 4, stiffer),))
+    brought = iter((5.0, 7.0, 5.0, 9.0))
+    best = dataclasses.replace(asking.best(1, ()))
+    monkeypatch.setattr(Asking, 'best', lambda *_: dataclasses.replace(best, nats=next(brought)))
+    assert what_would_decide([asking]).startswith('Neither stiffer wires')
+    assert what_would_decide([asking]).startswith('Stiffer wires would distinguish')
+
+
+def test_a_number_that_is_not_known_any_more_leaves_the_others_less_known(asking):
+    law = asking.laws['transport_delay']
+    names = [item.name for item in law.model.free]
+    k = names.index('capstan_exponent')
+    before = np.linalg.inv(law.precision)
+    changed = law.once(lambda plant: plant, 'capstan_exponent')
+    after = np.linalg.inv(changed.precision)
+    others = [i for i in range(len(names)) if i != k]
+    np.testing.assert_allclose(
+        after[np.ix_(others, others)], before[np.ix_(others, others)], rtol=1e-6
+    )
+    assert after[k, k] > before[k, k]
+
+
+def test_sensors_that_read_nothing_limit_nothing_and_stop_nothing(asking):
+    recorded = asking.recording
+    blind = np.zeros_like(recorded.tension.valid)
+    frozen = dataclasses.replace(
+        recorded, tension=dataclasses.replace(recorded.tension, valid=blind)
+    )
+    assert asking.seen(motion('stroke', 0.5))[1]
+    assert dataclasses.replace(asking, recording=frozen).seen(motion('stroke', 0.5))[1]
+    unseen = np.zeros_like(recorded.bending.valid)
+    lost = dataclasses.replace(
+        recorded, bending=dataclasses.replace(recorded.bending, valid=unseen)
+    )
+    assert dataclasses.replace(asking, recording=lost).best(1, ()) is None
+
+
+def test_of_two_joints_each_keeps_to_what_it_has_been_through(record):
+    plant = dataclasses.replace(LATE, joints=PlantDescription().joints)
+    case = case_of(record(plant, duration=6.0), plant, 'transport_delay', 'actuator_lag')
+    (asking,) = what_is_asked(case)
+    command = np.abs(case.recording.command.values).max(axis=0) / case.recording.gear
+    for each in design._within(case.recording, 'bend_x'):  # noqa: SLF001
+        assert np.all(np.abs(each.angle).max(axis=0) <= command + 1e-3)
+    beside = next(m for m in design._within(case.recording, 'bend_x') if 'beside' in m.name)  # noqa: SLF001
+    segment, answers = asking.seen(beside)
+    assert answers
+    assert np.abs(segment.angle).max(axis=0).min() > 0.0
+    proposed = propose(case, [asking])
+    table = np.array(proposed.command)
+    reach = np.abs(table).max(axis=0)
+    assert np.all(reach <= command + 1e-3)

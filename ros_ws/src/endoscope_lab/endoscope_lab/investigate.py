@@ -274,7 +274,8 @@ def fixed_motion(first: Motion, duration: float) -> CommandTable:
     """A motion of some length, fixed beforehand: the first one, then all of the library in turn."""
     # The library is what the loop chooses from, in its order, on one joint after the other.
     joints, names = first.joint.split(' and '), first.table.joints
-    by_joint = [library(joint, tuple(joints), first.largest, shipped_rig()) for joint in joints]
+    reaches = tuple((joint, first.largest) for joint in joints)
+    by_joint = [library(joint, reaches, shipped_rig()) for joint in joints]
     angles = [each.angle for motions in zip(*by_joint, strict=True) for each in motions]
     rest = np.zeros((sum(map(len, angles)), len(names)))
     rest[:, [names.index(joint) for joint in joints]] = np.concatenate(angles)

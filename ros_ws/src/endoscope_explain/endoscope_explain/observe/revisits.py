@@ -12,6 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from endoscope_core.physics.layout import IN_COMMAND
 from endoscope_core.physics.simulator import TICK
@@ -98,10 +99,16 @@ def _passed_by(moments: bytes, apart_s: float) -> tuple[Mask, Mask]:
 
 def newly_visited(made: Array, command: Array) -> float:
     """Share of a command (N,) in rad on ticks whose branch commands `made` (M,) have not passed."""
-    every = _ticks(TICK)
-    before, after = made[::every], command[::every]
-    passed, _ = _passed_by(np.concatenate([before, after]).tobytes(), every * TICK)
-    return float(1.0 - np.mean(passed[len(before) :]))
+    before, after = (each[:: _ticks(TICK)] for each in (made, command))
+    span = float(np.ptp(before))
+    if len(before) < 2 or span == 0.0:
+        return 1.0
+    states = [(a, np.gradient(a), _last_turn(a, NEAR_ANGLE * span)) for a in (before, after)]
+    fastest = float(np.max(np.abs(states[0][1])))
+    scales = (NEAR_ANGLE * span, NEAR_SPEED * fastest, NEAR_TURN * span)
+    known, new = (np.stack(own, axis=1) / scales for own in states)
+    distance, _ = KDTree(known).query(new, p=np.inf, distance_upper_bound=1.0 + 1e-9)
+    return float(np.mean(np.isinf(distance)))
 
 
 def strokes(command: Array, tick: float = TICK) -> list[Stroke]:

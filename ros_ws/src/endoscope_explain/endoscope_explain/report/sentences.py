@@ -240,8 +240,9 @@ def next_step(case: ExplainedCase) -> str:
     if case.audit.mistakes():
         return f'{_capital(case.audit.mistakes()[0].remedy)}.'
     if case.next_experiment is not None:
-        rivals = _all(case.next_experiment.separates)
-        return f'Have the master play next_experiment.csv: it decides between {rivals}.'
+        laws = case.next_experiment.separates
+        gain = f'decides between {_all(laws)}' if len(laws) > 1 else f'narrows {laws[0]}'
+        return f'Have the master play next_experiment.csv: it {gain}.'
     confounded = [(e.id, name) for e in case.effects for name in e.alternatives if name in KNOWN]
     if confounded:
         pair = ' from '.join(confounded[0])

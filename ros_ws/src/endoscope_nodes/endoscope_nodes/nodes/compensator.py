@@ -130,6 +130,7 @@ class CompensatorNode(EndoscopeNode):
     def _doubt_results(self, competing: str) -> None:
         """Take no result before another calibration: it may be somebody else's."""
         self._calibrated_in = ''
+        self.get_logger().warning(f'{names.CALIBRATION_RESULT} is not taken: {competing}')
         self._session.leave(competing)
 
     def _publish_state(self) -> None:
@@ -151,7 +152,7 @@ class CompensatorNode(EndoscopeNode):
         waiting = self._settings.mode != 'none' and not law.is_known
         level = ERROR if law.error else WARN if waiting else OK
         words = law.in_words(self.operate('calibrate'))
-        cut = stream.cut.report(law.ranges)
+        cut = stream.cut.report()
         if cut:
             level, words = max(level, WARN), f'{words}; {cut}'
         learnt = (f'{each.joint.capstan_exponent:.3f}' for each in law.feedforward.learnt)

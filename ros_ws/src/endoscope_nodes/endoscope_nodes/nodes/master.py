@@ -191,7 +191,7 @@ class MasterNode(EndoscopeNode):
         if unheeded and not self._warned:
             self._warned = True
             self.get_logger().warning(unheeded)
-        cut = '' if unheeded else motion.cut.report(motion.ranges)
+        cut = '' if unheeded else motion.cut.report()
         if unheeded or cut:
             return WARN, unheeded or cut, values
         if played is not None:

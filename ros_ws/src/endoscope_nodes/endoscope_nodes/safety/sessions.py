@@ -196,7 +196,7 @@ class SessionWatch:
         if self._session.hear(message.frame_id, now, doubt):
             if self._published[0]:
                 self._node.end_session()
-            self._state = (self._session.name, '')
+            self._published = (self._session.name, '')
             if self._on_enter is not None:
                 self._on_enter()
             return
