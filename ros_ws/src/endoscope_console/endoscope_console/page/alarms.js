@@ -20,7 +20,8 @@ export function standing(server, own) {
   // The release of a grip concerns its operator alone.
   const alarms = (server ?? []).filter(({ id }) => id !== 'dead_man' || own.mine);
   const add = (id, level, text) => {
-    if (!alarms.some((alarm) => alarm.id === id)) alarms.push({ id, level, text, latched: false });
+    // What only this page knows stands before what the server knows, of one level.
+    if (!alarms.some((alarm) => alarm.id === id)) alarms.unshift({ id, level, text, latched: false });
   };
   if (own.everConnected && !own.connected) {
     // What was received before is out of date.

@@ -14,6 +14,7 @@ import { See } from './see.js';
 import { Orders, Socket } from './sockets.js';
 import { View3d } from './view3d.js';
 
+const LOST = 'The controls are lost.';
 const TOKEN = 'endoscope token';
 /** A state that was under way when the controls were taken does not show it yet. */
 const CLAIM_SETTLES_MS = 500;
@@ -126,7 +127,14 @@ command.addEventListener('closed', ({ detail }) => {
   connection();
 });
 command.addEventListener('message', ({ detail }) => {
-  if (detail.op === 'lost') app.lost(`The controls are lost: ${detail.why || detail.by}.`);
+  if (detail.op !== 'lost') return;
+  const why = `The controls are lost: ${detail.why || detail.by}.`;
+  if (app.mine) return app.lost(why);
+  // The state comes by another socket: it may have been quicker, and does not know who took them.
+  if (app.whyLost !== LOST) return;
+  app.whyLost = why;
+  operate.say(why);
+  render();
 });
 telemetry.addEventListener('hello', ({ detail }) => {
   app.signals = detail.signals;
@@ -162,7 +170,7 @@ telemetry.addEventListener('message', ({ detail }) => {
   see.take(detail);
   const settled = performance.now() - app.claimedAt > CLAIM_SETTLES_MS;
   if (app.mine && settled && detail.lease?.holder !== app.you) {
-    app.lost('The controls are lost.');
+    app.lost(LOST);
   }
   // Once the server reports another grip, the end of the last one here is out of date. It may still
   // report that one: states that it sent before its end are under way.

@@ -33,6 +33,9 @@ test('a viewer does not see the grip of another, and of an ended graph nothing e
   assert.deepEqual(standing(given, WELL), []);
   assert.deepEqual(standing(given, { ...WELL, mine: true }).map((a) => a.id), ['dead_man']);
   assert.deepEqual(standing([], { ...WELL, lost: 'c2 took the controls' }).map((a) => a.text), ['c2 took the controls']);
+  // Two alarms fit beside the controls: a busy machine does not hide who took them.
+  const busy = [{ id: 'machine', level: 'medium' }, { id: 'fault', level: 'high' }];
+  assert.deepEqual(standing(busy, { ...WELL, lost: 'c2 took the controls' }).map((a) => a.id), ['fault', 'lease', 'machine']);
   assert.deepEqual(standing([{ id: 'graph', level: 'high' }], { ...WELL, pictureAge: 9 }).map((a) => a.id), ['graph']);
 });
 

@@ -31,7 +31,8 @@ def find(seen: Examined) -> Examined:
     recording, series, sensors = seen.recording, seen.recording.tension, seen.plant.sensors
     if series is None:
         torque = recording.shaft_effort is not None
-        beside = 'only the torque of the motor distinguishes' if torque else 'nothing distinguishes'
+        alone = 'the torque of the motor alone' if torque else 'nothing'
+        beside = f'{alone} distinguishes'
         return seen.found(ABSENT.found(recording, (WIRES,), beside=beside))
     noise, step = sensors.load_cell_noise, sensors.load_cell_resolution
     flat = series.values.reshape(len(series.time), -1)
