@@ -11,7 +11,8 @@ compared is right, too (expected discriminatory information: arXiv 2304.07949).
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import permutations
 
 import numpy as np
@@ -28,8 +29,9 @@ from endoscope_explain.explanation import NamedEffect
 from endoscope_explain.fit.model import JointModel, jacobian
 from endoscope_explain.imagined_motion import answer_to, is_safe
 from endoscope_explain.observe.observation import JointObservation, commanded
-from endoscope_explain.observe.revisits import newly_visited
+from endoscope_explain.observe.revisits import Visited
 from endoscope_explain.open_questions import (
+    DECIDED,
     OpenQuestion,
     coordinates,
     fitted_laws,
@@ -37,7 +39,7 @@ from endoscope_explain.open_questions import (
     observed,
     open_questions,
 )
-from endoscope_explain.prediction_set import NOTHING, OTHER_NUMBERS, SOMETHING_ELSE, Contest
+from endoscope_explain.prediction_set import NOTHING, OTHER_NUMBERS, SOMETHING_ELSE
 from endoscope_explain.recording import Recording
 
 Array = NDArray[np.float64]
@@ -49,8 +51,6 @@ MARGIN = 1.15
 LEAST_NATS = 3.0
 """Evidence in nats, as the posterior reads it, that a motion must be expected to bring: odds of 20
 to 1."""
-DECIDED = math.log(99.0)
-"""Logarithm of the odds at which more evidence decides nothing more."""
 HALVED = 0.5
 """Share of an interval's width that a motion must leave at most to be worth it: the recording made
 once more leaves 0.7."""
@@ -115,6 +115,18 @@ class _Law:
         model = replace(self.model, base=base, flags=flags, free=free)
         return replace(self, plant=plant, model=model, precision=known)
 
+    def reads(self, imagined: Recording) -> JointObservation:
+        """What the joint reads in an imagined motion, with the noise of the recordings."""
+        own = observed(imagined, self.plant, self.model.observation.joint)
+        noise = self.noise
+        rates = {c.signal: len(c.time) / own.duration for c in own.channels}
+        channels = tuple(
+            replace(c, noise=np.full_like(c.noise, noise[name] * math.sqrt(rates[name])))
+            for c in own.channels
+            if (name := c.signal) in noise
+        )
+        return replace(own, channels=channels)
+
     def slopes(self, observation: JointObservation) -> Array:
         """Derivatives (size, n) of what it reads in another motion, in noise units."""
         at = coordinates(self.model.base, self.model.free)
@@ -155,13 +167,48 @@ class BestMotion:
 
 
 @dataclass(frozen=True)
-class Asking:
-    """A question, and what is needed to judge a motion by it."""
+class LawsOfJoint:
+    """Laws that one joint of a rig may have, and what it would read by each in a motion."""
 
     recording: Recording
-    question: OpenQuestion
     laws: Mapping[str, _Law]
-    noise: Mapping[str, float] = field(repr=False)  # of the recordings; see `_Law.noise`
+
+    @cached_property
+    def limits(self) -> tuple[Array, Array, Array] | None:
+        """What the rig has been through; see `_limits`."""
+        return _limits(self.recording)
+
+    def not_played(self, joint: str, played: Played) -> list[Segment]:
+        """Motions of a joint that were not played yet; none where no limits are known."""
+        if self.limits is None:
+            return []
+        within = _within(self.recording, joint)
+        return [each for each in within if (each.name, each.joint) not in played]
+
+    def seen(self, full: Segment) -> tuple[Segment, dict[str, JointObservation]]:
+        """A motion as large as is safe by all laws, and what each reads; empty where none is."""
+        size = 1.0
+        while self.limits is not None and size >= SMALLEST:
+            segment = replace(full, angle=size * full.angle)
+            answers = {}
+            for name, law in self.laws.items():
+                imagined = answer_to(
+                    law.plant, segment.name, segment.time, segment.angle, self.recording.rig
+                )
+                if not is_safe(imagined, *self.limits):
+                    break
+                answers[name] = law.reads(imagined)
+            else:
+                return segment, answers
+            size *= 0.7
+        return full, {}
+
+
+@dataclass(frozen=True)
+class Asking(LawsOfJoint):
+    """A question, and what is needed to judge a motion by it."""
+
+    question: OpenQuestion
 
     @staticmethod
     def of(case: ExplainedCase, question: OpenQuestion) -> 'Asking':
@@ -170,14 +217,19 @@ class Asking:
             name: _law(case.recording, plant, question.joint)
             for name, plant in fitted_laws(case, question).items()
         }
-        noise = next(iter(laws.values())).noise if laws else {}
         chances = {n: p for n, p in question.chances.items() if n in laws}
         # What no plant can have has no name as far as motions go.
         tried = {*KNOWN, NOTHING, OTHER_NUMBERS, *laws}
         unnamed = sum(p for n, p in question.chances.items() if n not in tried)
         if unnamed > 0.0:
             chances[SOMETHING_ELSE] = unnamed
-        return Asking(case.recording, replace(question, chances=chances), laws, noise)
+        return Asking(case.recording, laws, replace(question, chances=chances))
+
+    @cached_property
+    def made(self) -> Visited:
+        """The branches of the joint's command that the recordings have passed."""
+        column = self.recording.joints.index(self.question.joint)
+        return Visited.by(commanded(self.recording)[:, column] / self.recording.gear)
 
     def once(
         self, changed: Callable[[PlantDescription], PlantDescription], unknown: str = ''
@@ -191,15 +243,10 @@ class Asking:
         question = self.question
         if not self.laws or len(question.chances) < 2:
             return None
-        motions = [
-            segment
-            for segment in _within(self.recording, question.joint)
-            if (segment.name, segment.joint) not in played
-        ]
-        seen = parallel_map(self.seen, motions, jobs)
+        seen = parallel_map(self.seen, self.not_played(question.joint, played), jobs)
         # Refitting a law brings it nearer: what is apart before is more than what is apart after.
         rough = [
-            (question.brings(self._apart(*each), each[0].duration, DECIDED)[1], *each)
+            (question.brings(self._apart(*each), each[0].duration)[1], *each)
             for each in seen
             if each[1]
         ]
@@ -210,41 +257,10 @@ class Asking:
                 break
             apart = self._apart(segment, answers, refitted=True)
             distances[segment.name] = _rms(apart, answers)
-            nats, per_second = question.brings(apart, segment.duration, DECIDED)
+            nats, per_second = question.brings(apart, segment.duration)
             if nats >= LEAST_NATS and (best is None or per_second > best.per_second):
                 best = BestMotion(question, self.recording.joints, segment, nats, per_second, {})
         return None if best is None else replace(best, distances=distances)
-
-    def seen(self, full: Segment) -> tuple[Segment, dict[str, JointObservation]]:
-        """A motion as large as is safe by all laws, and what each reads; empty where none is."""
-        limits = _limits(self.recording)
-        size = 1.0 if limits is not None else 0.0
-        while size >= SMALLEST:
-            segment = replace(full, angle=size * full.angle)
-            answers = {}
-            for name, law in self.laws.items():
-                plant = law.plant
-                imagined = answer_to(
-                    plant, segment.name, segment.time, segment.angle, self.recording.rig
-                )
-                if limits is None or not is_safe(imagined, *limits):
-                    break
-                answers[name] = self._observed(imagined, plant)
-            else:
-                return segment, answers
-            size *= 0.7
-        return full, {}
-
-    def _observed(self, imagined: Recording, plant: PlantDescription) -> JointObservation:
-        """What a joint reads in an imagined motion, with the noise of the recordings."""
-        own = observed(imagined, plant, self.question.joint)
-        rates = {c.signal: len(c.time) / own.duration for c in own.channels}
-        channels = tuple(
-            replace(c, noise=np.full_like(c.noise, self.noise[name] * math.sqrt(rates[name])))
-            for c in own.channels
-            if (name := c.signal) in self.noise
-        )
-        return replace(own, channels=channels)
 
     def _apart(
         self, segment: Segment, answers: Mapping[str, JointObservation], *, refitted: bool = False
@@ -264,7 +280,8 @@ class Asking:
                 squares -= float(towards @ np.linalg.solve(curvature, towards))
             apart[true, other] = 0.5 * max(0.0, squares)
         if SOMETHING_ELSE in self.question.chances:
-            shown = self._newly_visited(segment) * self.question.decides(segment.duration, DECIDED)
+            decides = DECIDED * self.question.temperature(segment.duration)
+            shown = self._newly_visited(segment) * decides
             for name in self.laws:
                 apart[name, SOMETHING_ELSE] = apart[SOMETHING_ELSE, name] = shown
         return apart
@@ -272,9 +289,8 @@ class Asking:
     def _newly_visited(self, segment: Segment) -> float:
         """Share of a motion that no recording has made: a law of no name may show there."""
         column = self.recording.joints.index(self.question.joint)
-        made = commanded(self.recording)[:, column] / self.recording.gear
         ticks = np.arange(0.0, segment.duration, TICK)
-        return newly_visited(made, np.interp(ticks, segment.time, segment.angle[:, column]))
+        return self.made.newly(np.interp(ticks, segment.time, segment.angle[:, column]))
 
 
 def _rms(apart: Mapping[tuple[str, str], float], answers: Mapping[str, JointObservation]) -> float:
@@ -350,20 +366,19 @@ def narrow(
     strength = [k for k, i in enumerate(law.model.free) if i.index == effect.definition.places[0]]
     if not strength:
         return None
-    question = OpenQuestion(effect.joint, {}, Contest((), (), 0.0, True), recording.duration)
-    asking = Asking(recording, question, {effect.id: law}, law.noise)
+    alone = LawsOfJoint(recording, {effect.id: law})
 
     def deviation(known: Array) -> float:
         return float(np.sqrt(np.linalg.inv(known)[strength[0], strength[0]]))
 
     def left(full: Segment) -> tuple[float, Segment]:
-        segment, answers = asking.seen(full)
+        segment, answers = alone.seen(full)
         if not answers:
             return 1.0, segment
         slopes = law.slopes(answers[effect.id])
         return deviation(law.precision + slopes.T @ slopes) / deviation(law.precision), segment
 
-    motions = [m for m in _within(recording, effect.joint) if (m.name, m.joint) not in played]
+    motions = alone.not_played(effect.joint, played)
     halving = [each for each in parallel_map(left, motions, jobs) if each[0] <= HALVED]
     if not halving:
         return None

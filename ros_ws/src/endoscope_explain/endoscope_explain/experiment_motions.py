@@ -50,19 +50,19 @@ def as_played(time: Array, angle: Array, rig: Rig, tick: float = TICK) -> tuple[
 
     It is shaped every `tick` s; the console does so every ms.
     """
-    facts = rig.joints
-    joints = angle.shape[1]
-    shaper = MotionShaper(
-        MotionLimits.either_way(
-            joints, facts.reach, facts.speed, facts.acceleration, facts.entry_step
-        )
-    )
+    shaper = MotionShaper(_limits(rig, angle.shape[1]))
     ticks = np.arange(time[0], time[-1] + SETTLES_S, tick)
     wanted = np.stack([np.interp(ticks, time, column) for column in angle.T], axis=1)
     shaper.restart(wanted[0])
     shaped = np.array([shaper.shape(each, tick) for each in wanted.tolist()])
     every = round(SAMPLE_S / tick)
     return ticks[::every], shaped[::every]
+
+
+def _limits(rig: Rig, joints: int) -> MotionLimits:
+    facts = rig.joints
+    most = (facts.reach, facts.speed, facts.acceleration, facts.entry_step)
+    return MotionLimits.either_way(joints, *most)
 
 
 # The same for every question about a rig.
@@ -157,5 +157,5 @@ def _played(
     still = np.zeros_like(time)
     columns = [signals[each](time)[0] if each in signals else still for each in joints]
     # Longer steps are ten times less work, where the rig does not take them for a stall.
-    tick = SAMPLE_S if rig.joints.entry_step / rig.joints.speed >= SAMPLE_S else TICK
+    tick = SAMPLE_S if _limits(rig, len(joints)).longest_period >= SAMPLE_S else TICK
     return Segment(name, joint, *as_played(time, np.stack(columns, axis=1), rig, tick))

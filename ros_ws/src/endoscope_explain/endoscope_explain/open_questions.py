@@ -37,6 +37,8 @@ from endoscope_explain.recording import Recording
 from endoscope_explain.search.screen import background, directions, screened
 from endoscope_explain.search.term import Term, starting_points
 
+DECIDED = math.log(99.0)
+"""Logarithm of the odds at which more evidence decides nothing more."""
 MOST_LAWS = 3
 """Of a question that are fitted: the likeliest."""
 _LEAST = 1e-9
@@ -54,19 +56,19 @@ class OpenQuestion:
     duration: float  # of the recordings, s
     effect: NamedEffect | None = None  # that was named; None where none was
 
-    def decides(self, duration: float, decided: float) -> float:
-        """Evidence in nats that is read as `decided` once a motion of `duration` s is made."""
-        return decided * self.contest.temperature(1.0 + duration / self.duration)
+    def temperature(self, duration: float) -> float:
+        """By how much evidence is divided once a motion of `duration` s is made."""
+        return self.contest.temperature(1.0 + duration / self.duration)
 
     def brings(
-        self, apart: Mapping[tuple[str, str], float], duration: float, decided: float
+        self, apart: Mapping[tuple[str, str], float], duration: float
     ) -> tuple[float, float]:
         """Evidence that a motion of `duration` s is expected to bring, in nats as it is read.
 
         `apart` is the evidence in nats of a law that is true over another one. Also, per second,
-        what of it brings the true one no further than to odds of `exp(decided)`.
+        what of it brings the true one no further than `DECIDED`.
         """
-        temperature = self.decides(duration, 1.0)
+        temperature = self.temperature(duration)
         whole = useful = 0.0
         total = sum(self.chances.values())
         for true, p in self.chances.items():
@@ -76,7 +78,7 @@ class OpenQuestion:
                 weight = p * q / (total * (total - p))
                 nats = apart.get((true, other), 0.0) / temperature
                 whole += weight * nats
-                useful += weight * min(nats, max(0.0, decided - math.log(p / q)))
+                useful += weight * min(nats, max(0.0, DECIDED - math.log(p / q)))
         return whole, useful / duration
 
 
@@ -114,30 +116,35 @@ def fitted_laws(case: ExplainedCase, question: OpenQuestion) -> dict[str, PlantD
     if question.effect is not None and named not in there:
         return {}
     laws = {named: plant}
-    for name in (n for n in question.chances if n not in {named, SOMETHING_ELSE, *there}):
-        if len(laws) == MOST_LAWS:
-            break
-        law = _law(case, question, name)
-        if law is not None:
-            laws[name] = law
-    return laws
-
-
-def _law(case: ExplainedCase, question: OpenQuestion, name: str) -> PlantDescription | None:
-    """The plant with another law in the place of what was named; None where it cannot have it."""
-    joint, plant = question.joint, case.explanation.augmented
+    others = [n for n in question.chances if n not in {named, SOMETHING_ELSE, *there}]
+    if not others:
+        return laws
     if question.effect is not None:
         bare = without(plant, question.effect)
     else:
         described = case.explanation.nominal.joints[joint]
         bare = replace(plant, joints={**plant.joints, joint: described})
     observation = observed(case.recording, bare, joint)
+    for name in others:
+        if len(laws) == MOST_LAWS:
+            break
+        law = _law(bare, observation, name, case.band)
+        if law is not None:
+            laws[name] = law
+    return laws
+
+
+def _law(
+    bare: PlantDescription, observation: JointObservation, name: str, band: float
+) -> PlantDescription | None:
+    """A plant without what was named that has another law; None where it cannot have it."""
     if name in KNOWN:
-        return with_effect(bare, observation, name, case.band)
+        return with_effect(bare, observation, name, band)
     if name not in (NOTHING, OTHER_NUMBERS):
         return None
-    fitted = refit(bare, observation, 6, case.band)
-    return with_fit(bare, joint, fitted if name == NOTHING else with_any_numbers(fitted))
+    fitted = refit(bare, observation, 6, band)
+    fitted = fitted if name == NOTHING else with_any_numbers(fitted)
+    return with_fit(bare, observation.joint, fitted)
 
 
 def observed(recording: Recording, plant: PlantDescription, joint: str) -> JointObservation:

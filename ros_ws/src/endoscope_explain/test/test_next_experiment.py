@@ -13,8 +13,8 @@ from endoscope_explain.experiment_motions import library
 from endoscope_explain.explanation import Explanation, NamedEffect, Verdict
 from endoscope_explain.imagined_motion import answer_to, is_safe
 from endoscope_explain.observe.observation import commanded
-from endoscope_explain.observe.revisits import newly_visited
-from endoscope_explain.open_questions import OpenQuestion, fitted_laws, open_questions
+from endoscope_explain.observe.revisits import Visited
+from endoscope_explain.open_questions import DECIDED, OpenQuestion, fitted_laws, open_questions
 from endoscope_explain.operator_changes import Change, what_would_decide
 from endoscope_explain.prediction_set import OTHER_NUMBERS, SOMETHING_ELSE, Contest
 
@@ -173,7 +173,6 @@ def test_no_motion_decides_more_per_second_than_the_proposed_one(late_case, aski
         return asking.question.brings(
             asking._apart(*answers, refitted=True),  # noqa: SLF001
             segment.duration,
-            design.DECIDED,
         )[1]
 
     recorded = late_case.recording
@@ -236,18 +235,19 @@ def test_for_a_law_of_no_name_a_motion_is_asked_for_that_was_never_made(late_cas
     assert asking._newly_visited(best.segment) > 0.5  # noqa: SLF001
     # What was made is not new any more.
     made = commanded(late_case.recording)[:, 0] / late_case.recording.gear
-    assert newly_visited(made, made) == 0.0
-    assert newly_visited(made, 0.5 * made) > 0.5
+    visited = Visited.by(made)
+    assert visited.newly(made) == 0.0
+    assert visited.newly(0.5 * made) > 0.5
 
 
 def test_evidence_is_weighed_by_probabilities_and_read_at_the_temperature():
     tried = contest('gravity', 'contact')
     question = OpenQuestion('bend_x', {'gravity': 0.5, 'contact': 0.5}, tried, 20.0)
     pairs = {('gravity', 'contact'): 30.0, ('contact', 'gravity'): 50.0}
-    nats, per_second = question.brings(pairs, 4.0, design.DECIDED)
+    nats, per_second = question.brings(pairs, 4.0)
     temperature = tried.temperature(1.0 + 4.0 / 20.0)
     assert nats == pytest.approx(40.0 / temperature)
-    assert per_second <= design.DECIDED / 4.0
+    assert per_second <= DECIDED / 4.0
     assert temperature > tried.temperature()
 
 

@@ -19,9 +19,9 @@ export const pictureAge = (picture, now) => (Number.isFinite(picture?.age) ? pic
 export function standing(server, own) {
   // The release of a grip concerns its operator alone.
   const alarms = (server ?? []).filter(({ id }) => id !== 'dead_man' || own.mine);
+  const here = [];
   const add = (id, level, text) => {
-    // What only this page knows stands before what the server knows, of one level.
-    if (!alarms.some((alarm) => alarm.id === id)) alarms.unshift({ id, level, text, latched: false });
+    if (!alarms.some((alarm) => alarm.id === id)) here.push({ id, level, text, latched: false });
   };
   if (own.everConnected && !own.connected) {
     // What was received before is out of date.
@@ -33,5 +33,6 @@ export function standing(server, own) {
   }
   if (own.lost) add('lease', 'medium', own.lost);
   if (own.gamepadLost) add('gamepad', 'medium', 'The gamepad is gone.');
-  return alarms.sort((a, b) => (ORDER[a.level] ?? 3) - (ORDER[b.level] ?? 3));
+  // What only this page knows stands before what the server knows, of one level.
+  return [...here, ...alarms].sort((a, b) => (ORDER[a.level] ?? 3) - (ORDER[b.level] ?? 3));
 }

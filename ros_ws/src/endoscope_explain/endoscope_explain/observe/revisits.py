@@ -97,18 +97,38 @@ def _passed_by(moments: bytes, apart_s: float) -> tuple[Mask, Mask]:
     return before, again
 
 
-def newly_visited(made: Array, command: Array) -> float:
-    """Share of a command (N,) in rad on ticks whose branch commands `made` (M,) have not passed."""
-    before, after = (each[:: _ticks(TICK)] for each in (made, command))
-    span = float(np.ptp(before))
-    if len(before) < 2 or span == 0.0:
-        return 1.0
-    states = [(a, np.gradient(a), _last_turn(a, NEAR_ANGLE * span)) for a in (before, after)]
-    fastest = float(np.max(np.abs(states[0][1])))
-    scales = (NEAR_ANGLE * span, NEAR_SPEED * fastest, NEAR_TURN * span)
-    known, new = (np.stack(own, axis=1) / scales for own in states)
-    distance, _ = KDTree(known).query(new, p=np.inf, distance_upper_bound=1.0 + 1e-9)
-    return float(np.mean(np.isinf(distance)))
+@dataclass(frozen=True)
+class Visited:
+    """Branches that a command has passed."""
+
+    passed: KDTree | None  # states over what is near; None where nothing moved
+    span: float  # of the angle, rad
+    scales: Array  # (3,), of angle, speed and last turn within which they are those of a moment
+
+    @staticmethod
+    def by(command: Array) -> 'Visited':
+        """Those of a command (M,) in rad on ticks."""
+        angle = command[:: _ticks(TICK)]
+        span = float(np.ptp(angle))
+        if len(angle) < 2 or span == 0.0:
+            return Visited(None, span, np.ones(3))
+        states = _states(angle, span)
+        fastest = float(np.max(np.abs(states[:, 1])))
+        scales = np.array((NEAR_ANGLE * span, NEAR_SPEED * fastest, NEAR_TURN * span))
+        return Visited(KDTree(states / scales), span, scales)
+
+    def newly(self, command: Array) -> float:
+        """Share of another command (N,) in rad on ticks that is on none of them."""
+        if self.passed is None:
+            return 1.0
+        states = _states(command[:: _ticks(TICK)], self.span) / self.scales
+        near, _ = self.passed.query(states, p=np.inf, distance_upper_bound=1.0 + 1e-9)
+        return float(np.mean(np.isinf(near)))
+
+
+def _states(angle: Array, span: float) -> Array:
+    """Angle, speed and last turn (N, 3) of moments."""
+    return np.stack([angle, np.gradient(angle), _last_turn(angle, NEAR_ANGLE * span)], axis=1)
 
 
 def strokes(command: Array, tick: float = TICK) -> list[Stroke]:
