@@ -16,7 +16,7 @@ from endoscope_core.monitoring.prediction import (
     PredictionBank,
 )
 from endoscope_core.monitoring.rig_change import CHANGES, DIRECTIONS, DRIFT_S, SMALLEST, Part
-from endoscope_core.monitoring.samples import Samples
+from endoscope_core.signals.samples import Samples
 from endoscope_core.physics.description import PlantDescription
 
 Array = NDArray[np.float64]
