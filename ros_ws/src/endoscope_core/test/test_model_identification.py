@@ -27,7 +27,9 @@ def test_a_model_is_found_again():
     assert 'dahl' in str(fit)
 
 
-@pytest.mark.parametrize('gain', [SMALLEST_ALPHA, GREATEST_ALPHA])
+@pytest.mark.parametrize(
+    'gain', [SMALLEST_ALPHA, pytest.param(GREATEST_ALPHA, marks=pytest.mark.nightly)]
+)
 @pytest.mark.parametrize('model', MODELS)
 def test_every_candidate_for_the_inverse_is_safe_whatever_the_gain_of_the_rig(model, gain):
     fit = fit_model([Recording(DRIVER, gain * forward(TRUTH, DRIVER))], 0, model)
