@@ -155,6 +155,7 @@ def test_stamps_that_jitter_are_noted_with_how_much(sound, quantity, jitter):
     assert noted.evidence['jitter_s'] == pytest.approx(jitter, rel=0.1)
 
 
+@pytest.mark.nightly
 def test_a_clock_that_is_set_back_is_a_fault(sound):
     time = sound.bending.time.copy()
     time[300:] -= 1.0
