@@ -36,6 +36,8 @@ API = {
 }
 """Pages of what packages export, with modules that they have to name."""
 TUTORIAL = WORKSPACE / 'doc/tutorial.md'
+DAILY = ('README', 'explaining', 'plant_file')
+"""Pages that are run for every change; the others show more of the same graph."""
 
 each_page = pytest.mark.parametrize('page', PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 
@@ -95,12 +97,15 @@ def test_readme_names_every_command() -> None:
 @pytest.mark.parametrize(
     'page',
     [
-        page
+        pytest.param(
+            page,
+            id=str(page.relative_to(ROOT)),
+            marks=() if page.stem in DAILY else pytest.mark.nightly,
+        )
         for page in PAGES
         if page != TUTORIAL
         and any(b.language in ('console', 'python') and b.is_run for b in blocks(page))
     ],
-    ids=lambda page: str(page.relative_to(ROOT)),
 )
 @pytest.mark.timeout(600)
 def test_what_a_page_shows_runs(page: Path, tmp_path: Path) -> None:
