@@ -12,10 +12,11 @@ from endoscope_bringup import cli
 from endoscope_bringup.demo import live_graph
 from endoscope_bringup.demo.live_graph import NODES, LiveGraph
 from endoscope_core.errors import NotPlayedError, RigStoppedError
+from endoscope_core.names import JOINTS
 from endoscope_core.physics import EffectSpec, PlantDescription, save_plant
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import hold, move, sequence
-from endoscope_core.signals.command_file import JOINTS, CommandTable, write_command_file
+from endoscope_core.signals.command_file import CommandTable, write_command_file
 from endoscope_explain.investigation import tracking
 from endoscope_explain.investigation.motions import Motion
 from endoscope_explain.investigation.tracking import held_out, tracked

@@ -20,6 +20,7 @@ from endoscope_bags.rig_kind import RIG_KIND
 from endoscope_bags.topic import LATCHED_QOS
 from endoscope_core.errors import InputError
 from endoscope_core.kinematics import tip_pose
+from endoscope_core.names import JOINTS
 from endoscope_core.physics import PlantDescription, SensorModel
 from endoscope_core.physics.on_stamps import (
     NANOSECONDS,
@@ -28,7 +29,7 @@ from endoscope_core.physics.on_stamps import (
     answer_commands,
 )
 from endoscope_core.physics.packing import recording_faults
-from endoscope_core.physics.plant_file import JOINT_NAMES, plant_as_text
+from endoscope_core.physics.plant_file import plant_as_text
 from endoscope_core.physics.sensing import TOPICS
 from endoscope_core.physics.simulator import TICK
 from endoscope_core.rig import Kind, Rig, RigKind, digest, rig_as_text
@@ -65,9 +66,9 @@ def answer_poses(
     """Poses that a tracker which reads these angles (N, J) in rad at these stamps would report."""
     # A pose at another time has no answer, nor has one at which the section would be bent by half a
     # turn or more: a tracker cannot distinguish it from others.
-    angles = np.zeros((len(stamp_ns), len(JOINT_NAMES)))
+    angles = np.zeros((len(stamp_ns), len(JOINTS)))
     for column, joint in enumerate(joints):
-        angles[:, JOINT_NAMES.index(joint)] = bending[:, column]
+        angles[:, JOINTS.index(joint)] = bending[:, column]
     read = dict(zip(stamp_ns.tolist(), angles, strict=True))
     seen = [
         (n, read[stamp])

@@ -18,10 +18,10 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.names import JOINTS
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.effects import KNOWN
 from endoscope_core.physics.simulator import TICK
-from endoscope_core.signals.command_file import JOINTS
 from endoscope_core.workers import parallel_map
 from endoscope_explain.case import ExplainedCase, NextExperiment
 from endoscope_explain.experiment_motions import SMALLEST, Segment, library

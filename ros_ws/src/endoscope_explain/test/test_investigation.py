@@ -10,12 +10,13 @@ import pytest
 
 from endoscope_core.errors import EndoscopeError, InputError, NotPlayedError, RigStoppedError
 from endoscope_core.investigation_folder import LOG, PAGE, held, is_left_behind
+from endoscope_core.names import JOINTS
 from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
 from endoscope_core.physics.plant_file import load_plant, save_plant
 from endoscope_core.physics.simulator import TICK
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import hold, move, sequence
-from endoscope_core.signals.command_file import JOINTS, CommandTable, read_command_file
+from endoscope_core.signals.command_file import CommandTable, read_command_file
 from endoscope_explain import prediction_set
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.explanation import Verdict

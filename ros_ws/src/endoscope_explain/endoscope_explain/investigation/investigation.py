@@ -9,10 +9,11 @@ from pathlib import Path
 from endoscope_core.atomic_output import write_text
 from endoscope_core.errors import NotPlayedError, RigStoppedError
 from endoscope_core.investigation_folder import PAGE
+from endoscope_core.names import JOINTS
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.plant_file import load_plant, save_plant
 from endoscope_core.rig import Rig
-from endoscope_core.signals.command_file import JOINTS, write_command_file
+from endoscope_core.signals.command_file import write_command_file
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.design import is_wide, propose, what_is_asked
 from endoscope_explain.explanation import NamedEffect, Verdict

@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.errors import InputError
+from endoscope_core.names import JOINTS
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.rig import Rig
 from endoscope_core.signals import Signal, hold, sequence
-from endoscope_core.signals.command_file import JOINTS, CommandTable
+from endoscope_core.signals.command_file import CommandTable
 from endoscope_core.signals.motions import (
     again_with_hold,
     chirp,

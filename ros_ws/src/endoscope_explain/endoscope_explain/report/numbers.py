@@ -3,8 +3,8 @@
 import math
 from dataclasses import dataclass
 
+from endoscope_core.names import JOINTS
 from endoscope_core.physics.effect import Parameter
-from endoscope_core.physics.plant_file import JOINT_NAMES
 from endoscope_explain.case import ExplainedCase, Ladder
 from endoscope_explain.explanation import ChannelFit, Estimate, NamedEffect
 from endoscope_explain.recording import MOVES_RAD, QUANTITY_UNITS, Recording, signal_name
@@ -107,7 +107,7 @@ def judged(case: ExplainedCase, ladder: Ladder) -> dict[str, dict[str, ChannelFi
 
 def rmse(signal: str, fit: ChannelFit) -> tuple[str, str]:
     """Error of a signal and its unit, as text."""
-    _, unit, factor = in_degrees('_rad', _units(JOINT_NAMES)[signal])
+    _, unit, factor = in_degrees('_rad', _units(JOINTS)[signal])
     return digits(factor * fit.rmse), unit
 
 

@@ -9,8 +9,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from endoscope_core.names import JOINTS
 from endoscope_core.physics.plant_file import save_plant
-from endoscope_core.signals.command_file import JOINTS, write_command_file
+from endoscope_core.signals.command_file import write_command_file
 from endoscope_explain.case import (
     EXPERIMENT_FILE,
     ExplainedCase,

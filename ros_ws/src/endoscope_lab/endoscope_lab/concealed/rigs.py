@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.names import JOINTS
 from endoscope_core.physics import JointParameters, PlantDescription, SensorParameters
 from endoscope_core.physics.family import shipped_family
 from endoscope_core.physics.layout import PROFILE_TERMS
@@ -14,7 +15,6 @@ from endoscope_explain.fit.free_parameters import SCALED_NOMINAL
 
 Array = NDArray[np.float64]
 
-JOINTS = ('bend_x', 'bend_y')
 MOST_BENT = math.radians(240.0)
 """Largest bend of the recorded tubes."""
 OFF = 0.1
