@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-SILENCE_NS = 2_000_000_000
+LEASE_SILENCE_NS = 2_000_000_000
 """Without a sign of its holder the lease ends."""
 UNATTENDED_NS = 5_000_000_000
 """A motion session whose operator has gone is paused after so long without another one."""
@@ -50,7 +50,7 @@ class Lease:
 
     def turn(self, now_ns: int) -> str:
         """Judge at `now_ns`: who has just lost the lease by silence; empty for nobody."""
-        if not self.holder or now_ns - self._heard_ns < SILENCE_NS:
+        if not self.holder or now_ns - self._heard_ns < LEASE_SILENCE_NS:
             return ''
         silent = self.holder
         self.release(silent)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from endoscope_core.monitoring.criteria import THRESHOLDS
 from endoscope_core.monitoring.jump_test import Block, Jumps, JumpTest
 from endoscope_core.monitoring.prediction import (
+    JOINT_TICK_S,
     SERVO_TICK_S,
-    TICK_S,
     PredictionBank,
 )
 from endoscope_core.monitoring.rig_change import CHANGES, DIRECTIONS, DRIFT_S, SMALLEST, Part
@@ -259,7 +259,9 @@ class RigWatch:
         fine: Array = begin + SERVO_TICK_S * np.arange(
             round(BLOCK_S / SERVO_TICK_S), dtype=np.float64
         )
-        grid: Array = begin + TICK_S * np.arange(round(BLOCK_S / TICK_S) + 1, dtype=np.float64)
+        grid: Array = begin + JOINT_TICK_S * np.arange(
+            round(BLOCK_S / JOINT_TICK_S) + 1, dtype=np.float64
+        )
         shaft = self.motor.between(grid)[:, :count]
         behind = self._bank.behind_motors(shaft[1:])
         motors = self._bank.motors(self.setpoint.held(fine))

@@ -13,7 +13,7 @@ from endoscope_core.errors import NotPlayedError, OutputError, RigStoppedError
 from endoscope_core.investigation_folder import is_left_behind
 from endoscope_nodes import names
 from endoscope_nodes.client.graph_client import GraphClient
-from endoscope_nodes.client.graph_listener import MASTER, RECORDER, GraphError
+from endoscope_nodes.client.graph_listener import MASTER, PATIENCE_S, RECORDER, GraphError
 from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
 from endoscope_nodes.client.handle_sender import clutch_message
 from endoscope_nodes.client.plant_adoption import (
@@ -25,7 +25,6 @@ from endoscope_nodes.runtime.node_parameters import FOR_SESSION
 from endoscope_nodes.runtime.qos import EVENT
 
 RECORDER_NODE = 'recorder'
-PATIENCE_S = 20.0
 NEXT_WORD_S = 1.5
 """The master says once a second how far it is; a word from before means nothing."""
 LET_GO_S = 0.2
