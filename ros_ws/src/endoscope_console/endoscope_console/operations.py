@@ -32,7 +32,7 @@ _NO_LEASE = (
     orders.Cancel,
     orders.Acknowledge,
 )
-_WHERE_NOBODY_OPERATES = (orders.Record, orders.Mark, orders.Stop)
+_WHERE_NOBODY_OPERATES = (orders.Record, orders.Mark, orders.StopInvestigation)
 _NOT_MEANWHILE = (orders.Set, orders.Record, orders.Adopt)
 """While a motion of an investigation is recorded as it is commanded."""
 
@@ -79,7 +79,7 @@ class Operations:
         if isinstance(order, _NO_LEASE) or client.id == self.controls.lease.holder:
             return
         # Ending motion is never wrong, whoever has the controls.
-        if isinstance(order, orders.State) and order.command in orders.HALTS:
+        if isinstance(order, orders.StateOrder) and order.command in orders.HALTS:
             return
         holder = self.controls.operator
         if isinstance(order, _WHERE_NOBODY_OPERATES) and not self.controls.lease.holder:
@@ -93,7 +93,7 @@ class Operations:
                 return await self.controls.claim(client, order.take)
             case orders.Release():
                 return self.controls.release(client)
-            case orders.State():
+            case orders.StateOrder():
                 return await self._state(order.command)
             case orders.Calibrate():
                 return await self.controls.moving(
@@ -120,7 +120,7 @@ class Operations:
                 )
             case orders.Cancel():
                 return await self.explanations.cancel(order.explanation)
-            case orders.Play():
+            case orders.PlayExperiment():
                 return await self._play(client, order.explanation)
             case orders.Adopt():
                 return await self._adopt(order.plant)
@@ -132,7 +132,7 @@ class Operations:
                 # Another hand is no hand for it.
                 self._consented = client
                 return self.investigations.answer(order.question, order.go)
-            case orders.Stop():
+            case orders.StopInvestigation():
                 return await self.investigations.stop(order.investigation, self._halt)
 
     async def _state(self, command: str) -> str:

@@ -24,8 +24,8 @@ from endoscope_core.names import JOINTS
 from endoscope_core.physics import PlantDescription, SensorModel
 from endoscope_core.physics.on_stamps import (
     NANOSECONDS,
-    Answer,
     AnswerStamps,
+    RigReadings,
     answer_commands,
 )
 from endoscope_core.physics.packing import recording_faults
@@ -231,13 +231,13 @@ def _answer_as_stamped(
     commands: BagCommands,
     stamps: AnswerStamps,
     recorded: JointStateSeries | None,
-) -> Answer:
+) -> RigReadings:
     """Answer by the recording's own habit of stamping its readings."""
     # A rig that stamps the beginning of its cycle, commands and then reads, records at a stamp what
     # the command of that stamp has already moved. The shafts, whose encoders are the finest clock,
     # show which habit a recording has.
 
-    def answer(read_delay: float, at: AnswerStamps) -> Answer:
+    def answer(read_delay: float, at: AnswerStamps) -> RigReadings:
         return answer_commands(plant, commands.stamp_ns, commands.shaft, at, read_delay=read_delay)
 
     if recorded is None:
@@ -277,8 +277,8 @@ def _kind(plant: PlantDescription, rig: Rig, commands: BagCommands) -> MessageSt
     return MessageStream(commands.namespace + RIG_KIND, STRING, content, commands.stamp_ns[:1])
 
 
-def _noisy(answer: Answer, sensors: SensorModel) -> Answer:
-    return Answer(
+def _noisy(answer: RigReadings, sensors: SensorModel) -> RigReadings:
+    return RigReadings(
         sensors.shaft_position(answer.shaft_position),
         sensors.shaft_velocity(answer.shaft_velocity),
         sensors.shaft_effort(answer.shaft_effort),
@@ -300,7 +300,7 @@ def _copied(recording: Recording, suffix: str) -> MessageStream:
 
 
 def _encoded(
-    answer: Answer, times: dict[str, _Times], joints: tuple[str, ...]
+    answer: RigReadings, times: dict[str, _Times], joints: tuple[str, ...]
 ) -> list[MessageStream]:
     def stream(
         suffix: str,

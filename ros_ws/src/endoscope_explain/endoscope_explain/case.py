@@ -87,7 +87,7 @@ Ladder = Mapping[str, Mapping[str, ChannelFit]]
 
 
 @dataclass(frozen=True)
-class Place:
+class Mismatch:
     """Where a mismatch shows."""
 
     stage: str
@@ -157,7 +157,7 @@ class ExplainedCase:
     explanation: Explanation  # the engine's own words
     verdict: Verdict  # of engine and audit together
     effects: tuple[NamedEffect, ...]  # of engine and audit together, most certain first
-    places: tuple[Place, ...]
+    places: tuple[Mismatch, ...]
     # The improved plant: the engine's augmented one with what the audit found in it.
     plant: PlantDescription
     ladder: Ladder  # on what was held out of the recording

@@ -14,7 +14,7 @@ from endoscope_explain.audit import AuditReport, audit_recording
 from endoscope_explain.case import (
     ChainCut,
     ExplainedCase,
-    Place,
+    Mismatch,
     combined_effects,
     combined_verdict,
     improved_plant,
@@ -190,7 +190,7 @@ def _cuts(case: ExplainedCase) -> tuple[ChainCut, ...]:
     return cut_at_motor(case.recording, case.explanation.refitted) if fitted else ()
 
 
-def _places(case: ExplainedCase) -> tuple[Place, ...]:
+def _places(case: ExplainedCase) -> tuple[Mismatch, ...]:
     if case.verdict in (Verdict.CONSISTENT, Verdict.INSUFFICIENT_DATA):
         return ()
     explanation = case.explanation

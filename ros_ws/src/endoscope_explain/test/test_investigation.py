@@ -24,8 +24,8 @@ from endoscope_explain.investigation import page
 from endoscope_explain.investigation.investigation import Investigation, investigate
 from endoscope_explain.investigation.log import LOG_MD, PLANT, Stop, begun
 from endoscope_explain.investigation.motions import (
-    Motion,
     MotionRefusedError,
+    RigMotion,
     commissioning,
     require_allowed,
 )
@@ -325,6 +325,6 @@ def test_a_rig_that_the_plant_answers_with_too_much_tension_is_not_moved():
 def test_a_motion_that_is_too_fast_is_refused():
     time = np.array([0.0, 1.0, 1.1, 2.0])
     angle = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0], [1.0, 0.0]])
-    motion = Motion('jump', 'bend_x', '', CommandTable(JOINTS, time, angle))
+    motion = RigMotion('jump', 'bend_x', '', CommandTable(JOINTS, time, angle))
     with pytest.raises(MotionRefusedError, match='speed is 10 rad/s'):
         require_allowed(motion, RIG)

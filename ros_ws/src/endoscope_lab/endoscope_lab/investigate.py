@@ -30,7 +30,7 @@ from endoscope_explain.investigation.investigation import (
     investigate,
 )
 from endoscope_explain.investigation.log import Stop
-from endoscope_explain.investigation.motions import Motion, commissioning
+from endoscope_explain.investigation.motions import RigMotion, commissioning
 from endoscope_explain.pipeline import Inputs, Sources, explain_case
 from endoscope_explain.recording import Recording
 from endoscope_explain.takes import APART_S, inputs_joined
@@ -195,7 +195,7 @@ class SimulatedRig:
         self._motion_s = self._cpu_s = 0.0
         self.last: _Answer | None = None
 
-    def play(self, motion: Motion, file: Path, bag: Path) -> None:
+    def play(self, motion: RigMotion, file: Path, bag: Path) -> None:
         """Play the motion of a file; the rig stops by itself if a wire is too tight."""
         if time.time() > self._until:
             raise NotPlayedError('its time is over')
@@ -270,7 +270,7 @@ def explained(
     return case, _Answer(explanation, motion_s, seconds, cpu_s)
 
 
-def fixed_motion(first: Motion, duration: float) -> CommandTable:
+def fixed_motion(first: RigMotion, duration: float) -> CommandTable:
     """A motion of some length, fixed beforehand: the first one, then all of the library in turn."""
     # The library is what the loop chooses from, in its order, on one joint after the other.
     joints, names = first.joint.split(' and '), first.table.joints

@@ -9,7 +9,7 @@ UNATTENDED_NS = 5_000_000_000
 
 
 @dataclass(frozen=True)
-class Claim:
+class ClaimOutcome:
     """Outcome of a claim."""
 
     granted: bool  # whether the client holds the lease now
@@ -25,18 +25,18 @@ class Lease:
         self.since_ns = 0  # 0 for nobody
         self._heard_ns = 0
 
-    def claim(self, client: str, take: bool, now_ns: int) -> Claim:
+    def claim(self, client: str, take: bool, now_ns: int) -> ClaimOutcome:
         """Ask for the lease, or `take` it from whoever holds it."""
         if not client:
             raise ValueError('a client without a name cannot hold the lease')
         holder = self.holder
         if holder == client:
             self._heard_ns = now_ns
-            return Claim(True)
+            return ClaimOutcome(True)
         if holder and not take:
-            return Claim(False, f'{holder} is the operator')
+            return ClaimOutcome(False, f'{holder} is the operator')
         self.holder, self.since_ns, self._heard_ns = client, now_ns, now_ns
-        return Claim(True, lost_by=holder)
+        return ClaimOutcome(True, lost_by=holder)
 
     def release(self, client: str) -> None:
         """Give the lease back; nothing where another holds it."""

@@ -4,7 +4,7 @@ from collections import Counter
 from dataclasses import dataclass
 from enum import StrEnum
 
-from endoscope_console.teleop.frames import InputFrame, Source
+from endoscope_console.teleop.frames import InputDevice, InputFrame
 from endoscope_core import teleop as rule
 from endoscope_core.choices import FOLLOW_THE_HANDLE
 from endoscope_core.teleop import DeadMan
@@ -234,7 +234,7 @@ class OperatorDeadMan:
             return Reason.UNFOCUSED
         grip, source, position_mode = self._of_grip
         if not frame.pressed:
-            gone = source == Source.GAMEPAD != frame.source
+            gone = source == InputDevice.GAMEPAD != frame.source
             return Reason.UNPLUGGED if gone else Reason.RELEASED
         same = (frame.grip, frame.source, frame.position_mode) == (grip, source, position_mode)
         return None if same else Reason.RELEASED

@@ -18,9 +18,9 @@ from endoscope_explain.case import ExplainedCase
 from endoscope_explain.design import is_wide, propose, what_is_asked
 from endoscope_explain.explanation import NamedEffect, Verdict
 from endoscope_explain.investigation import log as logs
-from endoscope_explain.investigation.log import Answer, Log, Name, Round, Stop
+from endoscope_explain.investigation.log import Log, Name, RigAnswer, Round, Stop
 from endoscope_explain.investigation.motions import (
-    Motion,
+    RigMotion,
     commissioning,
     of_experiment,
     require_allowed,
@@ -37,7 +37,7 @@ from endoscope_explain.takes import inputs_joined
 
 EXPERIMENTS = 4
 
-Play = Callable[[Motion, Path, Path], None]
+Play = Callable[[RigMotion, Path, Path], None]
 """Plays a motion, which a file holds, and records it to a bag."""
 Known = Mapping[str, Collection[str]]
 """By joint, names that were given or left open before."""
@@ -138,7 +138,7 @@ class _Running:
         if self.page is not None:
             write_text(self.of.folder / PAGE, self.page(log))
 
-    def record(self, motion: Motion, play: Play) -> None:
+    def record(self, motion: RigMotion, play: Play) -> None:
         """Have a motion played and recorded."""
         require_allowed(motion, self.of.rig)
         number = len(self.log.rounds) + 1
@@ -159,7 +159,7 @@ class _Running:
         play(motion, file, self.of.folder / asked.bag)
         self.keep(self.log.with_last(recorded=True, played_s=time.monotonic() - began))
 
-    def answered(self, explain: Explain) -> Motion | Stop:
+    def answered(self, explain: Explain) -> RigMotion | Stop:
         """Explain all recordings together, and work out what to ask next, or why nothing."""
         began = time.monotonic()
         whole = self.log.whole
@@ -223,7 +223,7 @@ class _Running:
             self.report(line)
 
 
-def answer_of(case: ExplainedCase, seconds: float) -> Answer:
+def answer_of(case: ExplainedCase, seconds: float) -> RigAnswer:
     """What all recordings show together."""
     fit = case.explanation.fit
     worst = [
@@ -240,7 +240,7 @@ def answer_of(case: ExplainedCase, seconds: float) -> Answer:
     ]
     sentence = verdict_sentence(case)
     places = tuple(where(place) for place in case.places)
-    return Answer(str(case.verdict), sentence, tuple(names), worst[0], worst[1], seconds, places)
+    return RigAnswer(str(case.verdict), sentence, tuple(names), worst[0], worst[1], seconds, places)
 
 
 def _open(left: Posterior) -> str:

@@ -13,7 +13,7 @@ from endoscope_core.physics.layout import IN_MOTOR
 from endoscope_core.physics.packing import without_functions
 from endoscope_core.physics.simulator import TICK
 from endoscope_explain.audit import Finding
-from endoscope_explain.case import ChainCut, Place, changed_parameters
+from endoscope_explain.case import ChainCut, Mismatch, changed_parameters
 from endoscope_explain.explanation import Explanation, NamedEffect
 from endoscope_explain.fit.free_parameters import nominal_number
 from endoscope_explain.fit.model import simulate_joint
@@ -90,7 +90,7 @@ def band_hz(excess: SignalExcess) -> tuple[float, float]:
 
 def locate_effects(
     recording: Recording, plant: PlantDescription, effects: Sequence[NamedEffect]
-) -> list[Place]:
+) -> list[Mismatch]:
     """Say where each effect of an explained recording shows, but for those that the plant lacks."""
     # The plant with all effects is compared with the same plant without the one in question: what
     # the measurement then has in excess is that effect's trace.
@@ -114,7 +114,7 @@ def _without(plant: PlantDescription, effect: NamedEffect) -> PlantDescription:
     return without_functions(plant, effect.joint, describe(effect.id).traits.families)
 
 
-def locate_unknown(recording: Recording, explanation: Explanation) -> list[Place]:
+def locate_unknown(recording: Recording, explanation: Explanation) -> list[Mismatch]:
     """Say where a mismatch shows that no effect of the catalogue explains."""
     term = explanation.unknown
     found = excess_between(recording, explanation.refitted, None)
@@ -138,7 +138,7 @@ def _shows_in(found: Sequence[SignalExcess]) -> str:
     return 'joint' if len(behind) == 2 else 'sensing'
 
 
-def locate_parameters(recording: Recording, explanation: Explanation) -> list[Place]:
+def locate_parameters(recording: Recording, explanation: Explanation) -> list[Mismatch]:
     """Say where parameters that changed show, stage by stage."""
     found = excess_between(recording, explanation.nominal, explanation.refitted)
     stages = dict.fromkeys(
@@ -149,10 +149,11 @@ def locate_parameters(recording: Recording, explanation: Explanation) -> list[Pl
     return [place(recording, found, stage, joint) for stage, joint in stages]
 
 
-def locate_findings(findings: Sequence[Finding]) -> list[Place]:
+def locate_findings(findings: Sequence[Finding]) -> list[Mismatch]:
     """Say where what the audit found is."""
     return [
-        Place(f.stage, f.joint, f.signals, f.intervals[:12], f.text, (0.0, 0.0)) for f in findings
+        Mismatch(f.stage, f.joint, f.signals, f.intervals[:12], f.text, (0.0, 0.0))
+        for f in findings
     ]
 
 
@@ -162,7 +163,7 @@ def place(
     stage: str,
     joint: str,
     began: float | None = None,
-) -> Place:
+) -> Mismatch:
     """Describe one trace in signals, time, state and frequency; `found` is of both joints."""
     by_signal = shares(found)
     j = recording.joints.index(joint)
@@ -174,7 +175,7 @@ def place(
     if began is not None:
         rest = '' if regime == 'throughout' or regime.startswith('after') else f', {regime}'
         regime = f'from {began:.1f} s on{rest}'
-    return Place(
+    return Mismatch(
         stage,
         joint,
         tuple(by_signal) or (telling[0].view.signal,),

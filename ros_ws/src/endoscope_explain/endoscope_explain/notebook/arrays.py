@@ -14,7 +14,7 @@ from endoscope_bags.message_types import JOINT_STATE
 from endoscope_core.errors import InputError, nearest
 from endoscope_core.names import JOINTS
 from endoscope_explain.notebook.arguments import SCRATCH, checked
-from endoscope_explain.notebook.signals import UNITS, Array, Signal, Signals, name_of, read
+from endoscope_explain.notebook.signals import UNITS, Array, RecordedSignal, Signals, name_of, read
 from endoscope_explain.recording import (
     BENDING,
     COMMAND,
@@ -32,7 +32,7 @@ LATEST_S = 2.0**31
 
 @checked
 def from_arrays(
-    signals: Mapping[str, Signal | tuple[ArrayLike, ArrayLike]],
+    signals: Mapping[str, RecordedSignal | tuple[ArrayLike, ArrayLike]],
     *,
     out: str | Path | None = None,
 ) -> Signals:
@@ -64,7 +64,7 @@ def from_arrays(
         if name not in known:
             raise InputError(f'{name} is not a signal: {nearest(name, known)}')
         topic, of, quantity = known[name]
-        pair = (given.time, given.values) if isinstance(given, Signal) else given
+        pair = (given.time, given.values) if isinstance(given, RecordedSignal) else given
         time, values = _checked(name, pair)
         first, shared = times.setdefault(topic, (name, time))
         if not np.array_equal(shared, time):

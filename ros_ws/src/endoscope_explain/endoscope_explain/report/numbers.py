@@ -14,7 +14,7 @@ PLANTS = {'nominal': 'described', 'refitted': 'refitted', 'augmented': 'improved
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownNumber:
     """A number with its interval, as text."""
 
     name: str
@@ -44,7 +44,7 @@ def in_degrees(name: str, unit: str) -> tuple[str, str, float]:
     return name, '' if unit == '-' else unit, 1.0
 
 
-def shown(name: str, estimate: Estimate) -> Shown:
+def shown(name: str, estimate: Estimate) -> ShownNumber:
     """An estimate as text."""
     name, unit, factor = in_degrees(name, estimate.unit)
     numbers = [factor * v for v in (estimate.value, estimate.low, estimate.high)]
@@ -55,7 +55,7 @@ def shown(name: str, estimate: Estimate) -> Shown:
     # As many digits as distinguish the ends of the interval.
     count = next((n for n in range(3, 8) if len({digits(v, n) for v in numbers[1:]}) > 1), 3)
     value, low, high = (digits(v, count) for v in numbers)
-    return Shown(name, value, low, high, unit)
+    return ShownNumber(name, value, low, high, unit)
 
 
 def measurable(effect: NamedEffect) -> dict[str, Estimate]:
@@ -64,7 +64,7 @@ def measurable(effect: NamedEffect) -> dict[str, Estimate]:
     return {name: e for name, e in effect.parameters.items() if _is_number(known[name], e)}
 
 
-def numbers_of(effect: NamedEffect) -> list[Shown]:
+def numbers_of(effect: NamedEffect) -> list[ShownNumber]:
     """The measurable parameters of an effect as text."""
     return [shown(name, e) for name, e in measurable(effect).items()]
 

@@ -16,8 +16,8 @@ from endoscope_explain.case import (
     EXPERIMENT_FILE,
     ExplainedCase,
     Ladder,
+    Mismatch,
     NextExperiment,
-    Place,
     Provenance,
 )
 from endoscope_explain.explanation import (
@@ -80,7 +80,7 @@ def report_mapping(case: ExplainedCase) -> dict[str, Any]:
     return content
 
 
-def _place(place: Place) -> dict[str, Any]:
+def _place(place: Mismatch) -> dict[str, Any]:
     return {
         'stage': place.stage,
         'joint': place.joint,

@@ -87,7 +87,7 @@ class Statement:
 
 
 @dataclass(frozen=True)
-class Judgement:
+class Correctness:
     """How far the reported statements are right."""
 
     # The first statements, as many as there are laws, name all laws; of a null case nothing is
@@ -118,18 +118,18 @@ def statements(explanation: Explanation) -> tuple[Statement, ...]:
 
 def judged(
     laws: Sequence[Law], reported: Sequence[Statement], also: frozenset[str] = frozenset()
-) -> Judgement:
+) -> Correctness:
     """Compare injected laws with statements, the most certain first; `also` is not judged."""
     named = [s for s in reported if any(_names(s, law) for law in laws)]
     wrong = [s for s in reported if s not in named and s.name not in also and not s.places & also]
     false = len({s.name for s in wrong})
     if not laws:
         none = not false
-        return Judgement(none, none, none, none, false, none, 1.0)
+        return Correctness(none, none, none, none, false, none, 1.0)
     kept = _once([s for s in reported if s in named or s in wrong], laws)
     leading = kept[: len(laws)]
     first = _all(leading, laws, _names)
-    return Judgement(
+    return Correctness(
         first,
         _all(leading, laws, _is_at),
         _all(leading, laws, lambda s, law: s.stage == law.stage),

@@ -17,7 +17,7 @@ from endoscope_lab.bench import keep_row, require_known, side_by_side
 from endoscope_lab.concealed import criteria
 from endoscope_lab.concealed.judge import (
     Case,
-    Judgement,
+    Correctness,
     Law,
     judged,
     statements,
@@ -178,7 +178,7 @@ def _numbers(case: Case, explanation: Explanation) -> Iterator[tuple[float, Esti
 
 def failed(stratum: str, seed: int, error: BaseException) -> Row:
     """The row of a case that could not be explained: wrong in every respect."""
-    wrong = Judgement(False, False, False, False, 0, False, math.nan)
+    wrong = Correctness(False, False, False, False, 0, False, math.nan)
     return Row(
         stratum=stratum,
         seed=seed,

@@ -240,7 +240,7 @@ def is_reported(mistake: Mistake, report: AuditReport) -> bool:
 
 
 @dataclass(frozen=True)
-class Row:
+class AuditedMistake:
     """The audit of one recording."""
 
     name: str  # of the mistake; empty for a correct recording
@@ -252,7 +252,7 @@ class Row:
     findings: tuple[str, ...]
 
 
-def audited(name: str, seed: int) -> Row:
+def audited(name: str, seed: int) -> AuditedMistake:
     """Audit the recording of a seed with a mistake, or without one if the name is empty."""
     mistake = MISTAKES.get(name)
     if mistake is None:
@@ -268,4 +268,4 @@ def audited(name: str, seed: int) -> Row:
     mistaken = bool(report.mistakes())
     right = is_reported(mistake, report) if mistake else not mistaken
     findings = tuple(f.text for f in report.faults())
-    return Row(name, seed, right, mistaken, seconds, findings)
+    return AuditedMistake(name, seed, right, mistaken, seconds, findings)

@@ -33,7 +33,7 @@ from endoscope_explain.recording import (
 )
 from endoscope_explain.report.sentences import verdict_sentence
 from endoscope_explain.report.writing import PLANT_YAML, REPORT_HTML, provenance, write_report
-from endoscope_lab.concealed.judge import Judgement, Law, judged, statements
+from endoscope_lab.concealed.judge import Correctness, Law, judged, statements
 from endoscope_lab.proof import SLAVE, slave
 from endoscope_lab.proof.drawing import drawn
 
@@ -111,7 +111,7 @@ PASSAGE_S = 6.0
 
 
 @dataclass(frozen=True)
-class Rig:
+class SealedRig:
     """A recorded rig, with its truth sealed."""
 
     number: int
@@ -134,7 +134,7 @@ class Passage:
 
 
 @dataclass(frozen=True)
-class Answer:
+class SealedAnswer:
     """The explanation of a rig before its seal was opened."""
 
     number: int
@@ -153,16 +153,16 @@ class Answer:
 class Outcome:
     """Truth and answer of one rig, compared."""
 
-    rig: Rig
-    answer: Answer
+    rig: SealedRig
+    answer: SealedAnswer
     truth: dict  # as it was sealed
-    judgement: Judgement
+    judgement: Correctness
     # Tracking of a motion with the inverse of the plant as described, and as improved; empty for a
     # rig that does not run.
     tracking: dict[str, Tracked] = field(default_factory=dict)
 
 
-def recorded(form: str, seed: int, number: int, effect: str | None, folder: Path) -> Rig:
+def recorded(form: str, seed: int, number: int, effect: str | None, folder: Path) -> SealedRig:
     """Draw a rig, record it twice, and seal its truth."""
     case, truth = drawn(form, seed, number, effect)
     folder.mkdir()
@@ -175,10 +175,10 @@ def recorded(form: str, seed: int, number: int, effect: str | None, folder: Path
     else:
         write_bag(case.recording, folder / RECORDING)
         write_bag(case.second, folder / SECOND)
-    return Rig(number, folder, sha256, case.laws, case.also, case.moved)
+    return SealedRig(number, folder, sha256, case.laws, case.also, case.moved)
 
 
-def explained(number: int, folder: Path, command: str) -> Answer:
+def explained(number: int, folder: Path, command: str) -> SealedAnswer:
     """Explain a rig from its recordings and the described plant, and write the report."""
     plant = load_plant(folder / PLANT)
     sources = Sources(
@@ -200,7 +200,7 @@ def explained(number: int, folder: Path, command: str) -> Answer:
     worst = max(seen.signals.values(), key=lambda s: np.mean(s.residual('refitted') ** 2))
     named = replace(explanation, verdict=case.verdict, effects=case.effects)
     misfit = partial(_misfit, case)
-    return Answer(
+    return SealedAnswer(
         number,
         verdict_sentence(case),
         statements(named),
@@ -212,7 +212,7 @@ def explained(number: int, folder: Path, command: str) -> Answer:
     )
 
 
-def compared(rig: Rig, answer: Answer) -> Outcome:
+def compared(rig: SealedRig, answer: SealedAnswer) -> Outcome:
     """Open a rig's seal and judge its explanation; BrokenSealError if the file was changed."""
     truth = opened(rig.folder / TRUTH, rig.sha256)
     return Outcome(rig, answer, truth, judged(rig.laws, answer.reported, rig.also))

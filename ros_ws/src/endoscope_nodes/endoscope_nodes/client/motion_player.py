@@ -41,7 +41,7 @@ Consent = Callable[[str], bool]
 """Asks a person, in words, whether something may be done."""
 
 
-class PlayedMotion(Protocol):
+class MotionToPlay(Protocol):
     """A motion as its player knows it."""
 
     @property
@@ -83,7 +83,7 @@ class MotionPlayer:
         self._plants = plants or AdoptedPlants(client)
         self.prepares = False  # once consented to, whether it may not be enabled yet
 
-    def play(self, motion: PlayedMotion, file: Path, bag: Path, plant: Path | None = None) -> None:
+    def play(self, motion: MotionToPlay, file: Path, bag: Path, plant: Path | None = None) -> None:
         """Play a motion, which a file holds, and record it to a bag that does not exist.
 
         With a plant file the compensator inverts that plant meanwhile; what was in force before is
@@ -209,7 +209,7 @@ class MotionPlayer:
             publisher.publish(clutch_message(False, client.graph_ns))
             client.node.destroy_publisher(publisher)
 
-    def _played(self, motion: PlayedMotion, file: Path) -> None:
+    def _played(self, motion: MotionToPlay, file: Path) -> None:
         client = self._client
         session = self._session()
         path = str(file.absolute())
