@@ -10,8 +10,8 @@ from chromium import LARGEST_PAGE, drawn
 
 from endoscope_bringup.demo import sentences
 from endoscope_bringup.demo.analysis import Angles, run_of, start_of_motion
-from endoscope_bringup.demo.page import endoscope_picture, report_page
 from endoscope_bringup.demo.procedure import MOTIONS, TUBES, CalibrationFacts, Method, RecordedRun
+from endoscope_bringup.demo.report_page import endoscope_picture, report_page
 from endoscope_bringup.demo.results import (
     CalibrationOutcome,
     DemoResults,

@@ -20,7 +20,7 @@ from endoscope_core.signals.command_file import CommandTable, read_command_file
 from endoscope_explain import prediction_set
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.explanation import Verdict
-from endoscope_explain.investigation import page
+from endoscope_explain.investigation import index_page
 from endoscope_explain.investigation.investigation import Investigation, investigate
 from endoscope_explain.investigation.log import LOG_MD, PLANT, Stop, begun
 from endoscope_explain.investigation.motions import (
@@ -200,7 +200,7 @@ def test_what_breaks_off_loses_nothing_and_is_called_what_it_was(
             both,
             interrupted,
             lambda bags, known: stribeck_case,
-            page=lambda log: page.page(log, both.folder),
+            page=lambda log: index_page.page(log, both.folder),
         )
     kept = log_of(both.folder)
     assert kept['stopped'] == stopped

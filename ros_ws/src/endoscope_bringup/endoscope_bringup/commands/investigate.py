@@ -88,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_core.errors import EndoscopeError
     from endoscope_core.investigation_folder import PAGE, held
     from endoscope_core.rig import load_rig
-    from endoscope_explain.investigation import page
+    from endoscope_explain.investigation import index_page
     from endoscope_explain.investigation.investigation import (
         Investigation,
         explain_together,
@@ -110,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
             player.play,
             lambda bags, known: explain_together(bags, known, of, step),
             track=player.play,
-            page=lambda log: page.page(log, of.folder),
+            page=lambda log: index_page.page(log, of.folder),
             report=say,
         )
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.monitoring.criteria import THRESHOLDS
 from endoscope_core.monitoring.jump_test import Jumps, JumpTest, ResidualBlock
 from endoscope_core.monitoring.prediction import (
     JOINT_TICK_S,
@@ -17,6 +16,7 @@ from endoscope_core.monitoring.prediction import (
 )
 from endoscope_core.monitoring.rig_change import CHANGES, DIRECTIONS, DRIFT_S, SMALLEST, Part
 from endoscope_core.monitoring.samples import Samples
+from endoscope_core.monitoring.thresholds import THRESHOLDS
 from endoscope_core.physics.description import PlantDescription
 
 Array = NDArray[np.float64]

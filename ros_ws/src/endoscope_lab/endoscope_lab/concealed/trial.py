@@ -14,7 +14,7 @@ from endoscope_explain.criteria import INTERVAL_WIDTH
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Estimate, Explanation
 from endoscope_lab.bench import keep_row, require_known, side_by_side
-from endoscope_lab.concealed import criteria
+from endoscope_lab.concealed import derivation
 from endoscope_lab.concealed.judge import (
     Case,
     Correctness,
@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     for (stratum, seed), each in differ:
         print(f'{stratum} {seed}: {each}')
     if args.derive:
-        criteria.derive(list(rows.values()), args.write)
+        derivation.derive(list(rows.values()), args.write)
     if before:
         print(f'{len(differ)} differences from {args.against} in {len(before)} cases')
     return 1 if differ or any(row.verdict == 'FAILED' for row in rows.values()) else 0

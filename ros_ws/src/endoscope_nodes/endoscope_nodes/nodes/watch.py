@@ -17,8 +17,8 @@ from endoscope_bags.errors import BagError
 from endoscope_bags.joint_state_series import JointStateSeries, decode_joint_states
 from endoscope_core.errors import FileError
 from endoscope_core.monitoring import DetectedChange, RigWatch
-from endoscope_core.monitoring.criteria import FALSE_ALARMS_PER_HOUR
 from endoscope_core.monitoring.rig_watch import BLOCK_S, LEARNT, WINDOWS
+from endoscope_core.monitoring.thresholds import FALSE_ALARMS_PER_HOUR
 from endoscope_core.physics import PlantDescription
 from endoscope_core.physics.plant_file import plant_from_mapping
 from endoscope_core.schema import parse_yaml
