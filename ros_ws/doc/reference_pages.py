@@ -34,7 +34,7 @@ from endoscope_nodes import program
 from endoscope_nodes.runtime.node_parameters import OF_NODE, OF_PROCESS
 from endoscope_nodes.runtime.parameters import Described, as_typed, described
 from endoscope_nodes.services import SERVICES, TRIGGER
-from endoscope_nodes.topics import RECORDED, TOPICS, Qos, Topic
+from endoscope_nodes.topics import RECORDED, TOPICS, GraphTopic, Qos
 
 PAGES = sorted(Path(__file__).parent.rglob('*.md'))
 WIDTH = 100
@@ -157,7 +157,7 @@ def _topics() -> Iterator[str]:
     )
 
 
-def _speakers(topic: Topic) -> tuple[str, ...]:
+def _speakers(topic: GraphTopic) -> tuple[str, ...]:
     return (
         f'`{topic.name}`',
         _names(topic.said_by) or 'an outside program',

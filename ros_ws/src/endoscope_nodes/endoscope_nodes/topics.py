@@ -36,7 +36,7 @@ LOCK_STEP = Qos(100)
 
 
 @dataclass(frozen=True)
-class Topic:
+class GraphTopic:
     """A topic of the interface."""
 
     name: str  # relative to the namespace of the graph, ``/endoscope`` by default, or absolute
@@ -63,7 +63,7 @@ _SENSOR = SENSOR_OFFERED, SENSOR_ASKED
 _COMMANDS, _RESULTS, _EVENTS, _LOCK_STEPS = ((q, q) for q in (COMMAND, RESULT, EVENT, LOCK_STEP))
 
 TOPICS = (
-    Topic(
+    GraphTopic(
         names.MASTER_MEASURED,
         _JOINT_STATE,
         "1 kHz or the handle's own",
@@ -73,7 +73,7 @@ TOPICS = (
         heard_by=('master',),
         one_sender=True,
     ),
-    Topic(
+    GraphTopic(
         names.MASTER_CLUTCH,
         'sensor_msgs/msg/Joy',
         'on change and 10 Hz',
@@ -84,7 +84,7 @@ TOPICS = (
         heard_by=('master', 'compensator'),
         one_sender=True,
     ),
-    Topic(
+    GraphTopic(
         names.SLAVE_COMMAND,
         _JOINT_STATE,
         _STREAM,
@@ -95,7 +95,7 @@ TOPICS = (
         heard_by=('compensator', 'controller'),
         one_sender=True,
     ),
-    Topic(
+    GraphTopic(
         names.SLAVE_MEASURED,
         _JOINT_STATE,
         '40 Hz',
@@ -105,7 +105,7 @@ TOPICS = (
         heard_by=(*_MOVERS, 'calibration', 'instrument_model', 'watch'),
         one_sender=True,
     ),
-    Topic(
+    GraphTopic(
         names.MOTOR_COMMAND,
         _JOINT_STATE,
         _STREAM,
@@ -116,7 +116,7 @@ TOPICS = (
         heard_by=('motor_driver',),
         one_sender=True,
     ),
-    Topic(
+    GraphTopic(
         names.MOTOR_SETPOINT,
         _JOINT_STATE,
         'on change, 1 kHz in motion, and 20 Hz',
@@ -127,7 +127,7 @@ TOPICS = (
         heard_by=('watch',),
         one_sender=True,
     ),
-    Topic(
+    GraphTopic(
         names.MOTOR_MEASURED,
         _JOINT_STATE,
         '1 kHz simulated, as the bus carries on hardware',
@@ -138,7 +138,7 @@ TOPICS = (
         heard_by=(*_MOVERS, 'calibration', 'supervisor', 'watch', 'load_cells'),
         one_sender=True,
     ),
-    Topic(
+    GraphTopic(
         names.WIRES_MEASURED,
         _JOINT_STATE,
         '1 kHz simulated, as the transmitter is read on hardware',
@@ -148,7 +148,7 @@ TOPICS = (
         heard_by=('calibration', 'supervisor', 'watch'),
         one_sender=True,
     ),
-    Topic(
+    GraphTopic(
         names.TRACKER_POSE,
         'geometry_msgs/msg/PoseStamped',
         '40 Hz',
@@ -156,7 +156,7 @@ TOPICS = (
         *_SENSOR,
         said_by=('em_tracker',),
     ),
-    Topic(
+    GraphTopic(
         names.CALIBRATION_COMMAND,
         _JOINT_STATE,
         '1 kHz while it calibrates or goes home',
@@ -168,7 +168,7 @@ TOPICS = (
         recorded=False,
         one_sender=True,
     ),
-    Topic(
+    GraphTopic(
         names.CALIBRATION_RESULT,
         _DIAGNOSTICS,
         'once a calibration, latched',
@@ -190,7 +190,7 @@ TOPICS = (
         heard_by=_MOVERS,
         one_sender=True,
     ),
-    Topic(
+    GraphTopic(
         names.CALIBRATION_FEEDBACK,
         _DIAGNOSTICS,
         'on change and 10 Hz while it calibrates or goes home, latched',
@@ -204,7 +204,7 @@ TOPICS = (
         *_RESULTS,
         said_by=('calibration',),
     ),
-    Topic(
+    GraphTopic(
         names.CALIBRATION_NUMBERS,
         _JOINT_STATE,
         'once a calibration, latched',
@@ -213,7 +213,7 @@ TOPICS = (
         *_RESULTS,
         said_by=('calibration',),
     ),
-    Topic(
+    GraphTopic(
         names.CORRECTION,
         _JOINT_STATE,
         '1 kHz while commands come',
@@ -225,7 +225,7 @@ TOPICS = (
         recorded=False,
         one_sender=True,
     ),
-    Topic(
+    GraphTopic(
         names.COMPENSATOR_STATE,
         _DIAGNOSTICS,
         _LATCHED_STATE,
@@ -235,7 +235,7 @@ TOPICS = (
         said_by=('compensator',),
         one_sender=True,
     ),
-    Topic(
+    GraphTopic(
         names.COMPENSATOR_PLANT,
         _DIAGNOSTICS,
         _LATCHED_STATE,
@@ -252,7 +252,7 @@ TOPICS = (
         heard_by=('master', 'watch'),
         one_sender=True,
     ),
-    Topic(
+    GraphTopic(
         names.COMPENSATOR_ADOPT,
         _DIAGNOSTICS,
         'when somebody asks',
@@ -261,7 +261,7 @@ TOPICS = (
         *_EVENTS,
         heard_by=('compensator',),
     ),
-    Topic(
+    GraphTopic(
         names.OPERATING_STATE,
         'std_msgs/msg/String',
         'on change and 20 Hz, latched',
@@ -271,7 +271,7 @@ TOPICS = (
         heard_by=('motor_driver',),
         one_sender=True,
     ),
-    Topic(
+    GraphTopic(
         names.MOTION_SESSION,
         'std_msgs/msg/Header',
         'on change and 20 Hz',
@@ -281,7 +281,7 @@ TOPICS = (
         heard_by=(*_MOVERS, 'calibration', 'motor_driver'),
         one_sender=True,
     ),
-    Topic(
+    GraphTopic(
         names.STATE_COMMAND,
         'std_msgs/msg/String',
         'when somebody asks',
@@ -290,7 +290,7 @@ TOPICS = (
         asked=EVENT,
         heard_by=('supervisor', 'calibration'),
     ),
-    Topic(
+    GraphTopic(
         names.CONSOLE_LOG,
         _DIAGNOSTICS,
         'when somebody asks at a page',
@@ -298,7 +298,7 @@ TOPICS = (
         '`console_web: order` with `operator`, `address`, `order`, `answer` and `why`',
         *_EVENTS,
     ),
-    Topic(
+    GraphTopic(
         names.RECORDER_MARK,
         'std_msgs/msg/String',
         'when somebody asks',
@@ -308,7 +308,7 @@ TOPICS = (
         said_by=('watch',),
         heard_by=('recorder',),
     ),
-    Topic(
+    GraphTopic(
         names.SIMULATED_WIRES,
         _JOINT_STATE,
         _STREAM,
@@ -318,7 +318,7 @@ TOPICS = (
         heard_by=('load_cells',),
         recorded=False,
     ),
-    Topic(
+    GraphTopic(
         names.SIMULATED_BENDING,
         _JOINT_STATE,
         _STREAM,
@@ -328,7 +328,7 @@ TOPICS = (
         heard_by=('em_tracker',),
         recorded=False,
     ),
-    Topic(
+    GraphTopic(
         names.RIG_KIND,
         'std_msgs/msg/String',
         'once and on change, latched',
@@ -338,7 +338,7 @@ TOPICS = (
         *_RESULTS,
         said_by=('motor_driver',),
     ),
-    Topic(
+    GraphTopic(
         names.ROBOT_DESCRIPTION,
         'std_msgs/msg/String',
         'once, latched',
@@ -347,7 +347,7 @@ TOPICS = (
         *_RESULTS,
         said_by=('instrument_model',),
     ),
-    Topic(
+    GraphTopic(
         names.ROBOT_DESCRIPTION_OF_ALL,
         'std_msgs/msg/String',
         'once, latched',
@@ -355,7 +355,7 @@ TOPICS = (
         *_RESULTS,
         said_by=('instrument_model',),
     ),
-    Topic(
+    GraphTopic(
         names.JOINT_STATES,
         _JOINT_STATE,
         '20 Hz',
@@ -364,7 +364,7 @@ TOPICS = (
         *_SENSOR,
         said_by=('instrument_model',),
     ),
-    Topic(
+    GraphTopic(
         names.TRANSFORMS,
         'tf2_msgs/msg/TFMessage',
         '20 Hz',
@@ -373,7 +373,7 @@ TOPICS = (
         asked=SENSOR_OFFERED,
         said_by=('instrument_model',),
     ),
-    Topic(
+    GraphTopic(
         names.DIAGNOSTICS,
         _DIAGNOSTICS,
         '1 Hz, and at once when a node is in trouble',
@@ -382,7 +382,7 @@ TOPICS = (
         said_by=('every node',),
         heard_by=('supervisor',),
     ),
-    Topic(
+    GraphTopic(
         names.CLOCK,
         'rosgraph_msgs/msg/Clock',
         'every simulated millisecond, in simulated time only',
