@@ -24,7 +24,7 @@ from endoscope_core.physics.description import TermSpec
 from endoscope_explain import many_bags, pipeline
 from endoscope_explain.case import ExplainedCase
 from endoscope_explain.pipeline import Sources
-from endoscope_explain.recording import Recording
+from endoscope_explain.recording import RigRecording
 
 WORKSPACE = Path(__file__).parents[1] / 'ros_ws'
 KEPT = WORKSPACE / 'build' / 'explained'
@@ -86,7 +86,7 @@ class Corpus:
             self._may_explain = False
 
     def explain_recording(
-        self, recording: Recording, plant: PlantDescription, **options: Any
+        self, recording: RigRecording, plant: PlantDescription, **options: Any
     ) -> Any:
         """Explain as the engine does, once."""
         jobs, tell = options.pop('jobs', 2), options.pop('progress', None) or (lambda _: None)

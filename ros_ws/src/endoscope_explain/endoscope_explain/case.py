@@ -17,7 +17,7 @@ from endoscope_explain.explanation import (
     Verdict,
 )
 from endoscope_explain.fit.free_parameters import BAND, nominal_number
-from endoscope_explain.recording import Recording
+from endoscope_explain.recording import RigRecording
 
 
 def combined_effects(explanation: Explanation, audit: AuditReport) -> tuple[NamedEffect, ...]:
@@ -152,7 +152,7 @@ class ChainCut:
 class ExplainedCase:
     """All that is known about one recording."""
 
-    recording: Recording  # as audited
+    recording: RigRecording  # as audited
     audit: AuditReport
     explanation: Explanation  # the engine's own words
     verdict: Verdict  # of engine and audit together

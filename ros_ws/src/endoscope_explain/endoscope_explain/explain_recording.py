@@ -37,7 +37,7 @@ from endoscope_explain.fit.nominal import (
     with_references,
 )
 from endoscope_explain.observe.observation import JointObservation, observe, with_held_noise
-from endoscope_explain.recording import LEAST_DURATION_S, MOVES_RAD, Recording
+from endoscope_explain.recording import LEAST_DURATION_S, MOVES_RAD, RigRecording
 from endoscope_explain.search.levels import MOST_EFFECTS, JointSearch, search
 from endoscope_explain.search.other_joint import stands_beside
 from endoscope_explain.search.refit import Candidate
@@ -55,10 +55,10 @@ Explained = tuple[JointSearch, Decision]
 
 
 def explain_recording(
-    recording: Recording,
+    recording: RigRecording,
     plant: PlantDescription,
     *,
-    baseline: Recording | None = None,
+    baseline: RigRecording | None = None,
     band: float = BAND,
     most_effects: int = MOST_EFFECTS,
     given: GivenJoints | None = None,
@@ -128,7 +128,7 @@ def explain_recording(
 
 def _healthy(
     observations: tuple[JointObservation, ...],
-    baseline: Recording,
+    baseline: RigRecording,
     plant: PlantDescription,
     band: float,
     left_out: tuple[str, ...],

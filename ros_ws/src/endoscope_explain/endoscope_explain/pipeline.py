@@ -35,7 +35,7 @@ from endoscope_explain.locate.locating import (
     locate_unknown,
 )
 from endoscope_explain.recording import (
-    Recording,
+    RigRecording,
     recording_from_bag,
     with_unrecorded,
 )
@@ -72,8 +72,8 @@ class Inputs:
     sources: Sources
     audit: AuditReport
     # As audited.
-    baseline: Recording | None = None
-    validation: Recording | None = None
+    baseline: RigRecording | None = None
+    validation: RigRecording | None = None
     mistakes_of_others: tuple[str, ...] = ()  # what somebody took wrongly in these two, in words
 
     @property
@@ -85,7 +85,7 @@ class Inputs:
 def read_inputs(sources: Sources) -> Inputs:
     """Read and audit all recordings of a case; BagError, with its name, if one cannot be used."""
 
-    def read(path: Path, plant: PlantDescription) -> Recording:
+    def read(path: Path, plant: PlantDescription) -> RigRecording:
         return recording_from_bag(
             path, plant, without=sources.without, namespace=sources.namespace, rig=sources.rig
         )
@@ -94,7 +94,7 @@ def read_inputs(sources: Sources) -> Inputs:
     plant = sources.plant.of_joints(raw.joints)
     mistaken: list[str] = []
 
-    def second(what: str, path: Path | None) -> Recording | None:
+    def second(what: str, path: Path | None) -> RigRecording | None:
         if path is None:
             return None
         other = read(path, plant)
@@ -109,7 +109,7 @@ def read_inputs(sources: Sources) -> Inputs:
     return Inputs(sources, _audited(raw, plant), baseline, validation, tuple(mistaken))
 
 
-def _audited(raw: Recording, plant: PlantDescription) -> AuditReport:
+def _audited(raw: RigRecording, plant: PlantDescription) -> AuditReport:
     report = audit_recording(raw, plant)
     return replace(report, recording=with_command_between_rows(report.recording, plant))
 

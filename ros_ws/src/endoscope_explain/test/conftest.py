@@ -22,7 +22,7 @@ from endoscope_explain.explanation import (
 )
 from endoscope_explain.observe.predicted_signals import fits_by, view
 from endoscope_explain.pipeline import Inputs, Sources, explain_case
-from endoscope_explain.recording import Recording, Series
+from endoscope_explain.recording import RigRecording, Series
 
 # Tests import each other's recordings by name.
 sys.path.insert(0, str(Path(__file__).parent))
@@ -42,7 +42,7 @@ def make_recording(
     duration: float = 12.0,
     seed: int = 1,
     command: np.ndarray | None = None,
-) -> Recording:
+) -> RigRecording:
     """Sensors' readings of a plant under a shaft command, or swept, stepped and held."""
     plant = plant or PlantDescription()
     n = int(duration / TICK) if command is None else len(command)
@@ -56,7 +56,7 @@ def make_recording(
     truth = simulate(plant, command)
     sensors = SensorModel(plant.sensors, seed)
     tracker = slice(None, None, TRACKER_EVERY)
-    return Recording(
+    return RigRecording(
         'synthetic',
         0.0,
         joints,

@@ -32,7 +32,7 @@ from endoscope_explain.investigation.investigation import (
 from endoscope_explain.investigation.log import Stop
 from endoscope_explain.investigation.motions import RigMotion, commissioning
 from endoscope_explain.pipeline import Inputs, Sources, explain_case
-from endoscope_explain.recording import Recording
+from endoscope_explain.recording import RigRecording
 from endoscope_explain.takes import APART_S, inputs_joined
 from endoscope_lab.bench import keep_row, rows_so_far, side_by_side, table_head, table_row
 from endoscope_lab.concealed.another_rig import Laws
@@ -191,7 +191,7 @@ class SimulatedRig:
         self._case, self._read, self._until = case, read, until
         self._noise = np.random.default_rng([case.seed, 1])
         self._command = np.empty((0, len(case.true.joints)))
-        self._recordings: dict[Path, Recording] = {}
+        self._recordings: dict[Path, RigRecording] = {}
         self._motion_s = self._cpu_s = 0.0
         self.last: _Answer | None = None
 
@@ -215,7 +215,7 @@ class SimulatedRig:
         self.last = replace(answer, cpu_s=self._cpu_s)
         return case
 
-    def recorded(self, table: CommandTable, name: str) -> Recording:
+    def recorded(self, table: CommandTable, name: str) -> RigRecording:
         """Readings of a motion that is played after all earlier ones and a rest."""
         ticks = np.arange(0.0, table.time[-1], TICK)
         columns = [table.joints.index(joint) for joint in self._case.true.joint_names()]
@@ -251,7 +251,7 @@ def _since(readings: Readings, begin: int) -> Readings:
 
 
 def explained(
-    recordings: Sequence[Recording],
+    recordings: Sequence[RigRecording],
     plant: PlantDescription,
     motion_s: float,
     known: Known = MappingProxyType({}),

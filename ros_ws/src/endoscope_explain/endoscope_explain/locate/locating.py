@@ -21,7 +21,7 @@ from endoscope_explain.locate.conditions import conditions, drive, regime_in_wor
 from endoscope_explain.locate.excess import SignalExcess, excess_between, intervals, onset, shares
 from endoscope_explain.observe.observation import JointObservation, observe
 from endoscope_explain.observe.predicted_signals import packed_rig, reading_lead, simulate_rig
-from endoscope_explain.recording import Recording
+from endoscope_explain.recording import RigRecording
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ OF_THE_MOTOR = {'shaft_position', 'shaft_velocity'}
 """Its effort is what the wires pull by."""
 
 
-def cut_at_motor(recording: Recording, plant: PlantDescription) -> tuple[ChainCut, ...]:
+def cut_at_motor(recording: RigRecording, plant: PlantDescription) -> tuple[ChainCut, ...]:
     """Compare both ways to drive wires and joint by a plain plant; none without shaft reading."""
     shaft = recording.shaft_position
     if shaft is None:
@@ -89,7 +89,7 @@ def band_hz(excess: SignalExcess) -> tuple[float, float]:
 
 
 def locate_effects(
-    recording: Recording, plant: PlantDescription, effects: Sequence[NamedEffect]
+    recording: RigRecording, plant: PlantDescription, effects: Sequence[NamedEffect]
 ) -> list[Mismatch]:
     """Say where each effect of an explained recording shows, but for those that the plant lacks."""
     # The plant with all effects is compared with the same plant without the one in question: what
@@ -114,7 +114,7 @@ def _without(plant: PlantDescription, effect: NamedEffect) -> PlantDescription:
     return without_functions(plant, effect.joint, describe(effect.id).traits.families)
 
 
-def locate_unknown(recording: Recording, explanation: Explanation) -> list[Mismatch]:
+def locate_unknown(recording: RigRecording, explanation: Explanation) -> list[Mismatch]:
     """Say where a mismatch shows that no effect of the catalogue explains."""
     term = explanation.unknown
     found = excess_between(recording, explanation.refitted, None)
@@ -138,7 +138,7 @@ def _shows_in(found: Sequence[SignalExcess]) -> str:
     return 'joint' if len(behind) == 2 else 'sensing'
 
 
-def locate_parameters(recording: Recording, explanation: Explanation) -> list[Mismatch]:
+def locate_parameters(recording: RigRecording, explanation: Explanation) -> list[Mismatch]:
     """Say where parameters that changed show, stage by stage."""
     found = excess_between(recording, explanation.nominal, explanation.refitted)
     stages = dict.fromkeys(
@@ -158,7 +158,7 @@ def locate_findings(findings: Sequence[Finding]) -> list[Mismatch]:
 
 
 def place(
-    recording: Recording,
+    recording: RigRecording,
     found: Sequence[SignalExcess],
     stage: str,
     joint: str,

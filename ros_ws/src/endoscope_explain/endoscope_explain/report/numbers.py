@@ -7,7 +7,7 @@ from endoscope_core.names import JOINTS
 from endoscope_core.physics.effect import Parameter
 from endoscope_explain.case import ExplainedCase, Ladder
 from endoscope_explain.explanation import ChannelFit, Estimate, NamedEffect
-from endoscope_explain.recording import MOVES_RAD, QUANTITY_UNITS, Recording, signal_name
+from endoscope_explain.recording import MOVES_RAD, QUANTITY_UNITS, RigRecording, signal_name
 
 PLANTS = {'nominal': 'described', 'refitted': 'refitted', 'augmented': 'improved'}
 """The one word for each plant of report.json."""
@@ -78,7 +78,7 @@ def form(effect: NamedEffect) -> tuple[str, ...]:
     )
 
 
-def moving_joints(recording: Recording) -> tuple[str, ...]:
+def moving_joints(recording: RigRecording) -> tuple[str, ...]:
     """Joints whose motor was commanded to move, or moved."""
     sources = [s for s in (recording.command, recording.shaft_position) if s is not None]
     return tuple(

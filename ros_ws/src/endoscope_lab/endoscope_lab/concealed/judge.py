@@ -8,7 +8,7 @@ from endoscope_core.physics import PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_explain.explanation import Explanation, Verdict
-from endoscope_explain.recording import Recording
+from endoscope_explain.recording import RigRecording
 
 
 @dataclass(frozen=True)
@@ -34,9 +34,9 @@ class Case:
     bare: PlantDescription
     true: PlantDescription
     laws: tuple[Law, ...]  # injected; empty for a null case
-    recording: Recording  # to explain
-    second: Recording  # of another motion, for validation
-    baseline: Recording | None = None  # the rig before anything was injected
+    recording: RigRecording  # to explain
+    second: RigRecording  # of another motion, for validation
+    baseline: RigRecording | None = None  # the rig before anything was injected
     left_out: tuple[str, ...] = ()  # effects whose formulas are not tried
     # Effects and places that do not count as false names: the form of the rig itself.
     also: frozenset[str] = frozenset()

@@ -26,7 +26,7 @@ from endoscope_explain.recording import (
     COMMAND,
     MOTOR,
     WIRES,
-    Recording,
+    RigRecording,
     Series,
     motor_name,
     wire_names,
@@ -41,7 +41,7 @@ BEGIN_NS = 1_000_000_000
 """First stamp, one second after the start of simulated time."""
 
 
-def write_bag(recording: Recording, out: Path) -> None:
+def write_bag(recording: RigRecording, out: Path) -> None:
     """Write commands, motors, wires and tip at their stamps; BagError if `out` cannot be made."""
     motors = [motor_name(joint) for joint in recording.joints]
     wires = [wire for joint in recording.joints for wire in wire_names(joint)]
