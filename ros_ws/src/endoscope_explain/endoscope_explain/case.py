@@ -16,7 +16,8 @@ from endoscope_explain.explanation import (
     NominalEstimate,
     Verdict,
 )
-from endoscope_explain.fit.free_parameters import BAND, nominal_number
+from endoscope_explain.fit.free_parameters import nominal_number
+from endoscope_explain.options import BAND
 from endoscope_explain.recording import RigRecording
 
 

@@ -14,7 +14,6 @@ from endoscope_explain.case import ExplainedCase
 from endoscope_explain.decide.conclusions import spec_of
 from endoscope_explain.explanation import NamedEffect
 from endoscope_explain.fit.free_parameters import (
-    BAND,
     LEAD,
     FreeParameter,
     effect_parameters,
@@ -32,6 +31,7 @@ from endoscope_explain.fit.model import (
 )
 from endoscope_explain.fit.nominal import with_any_numbers
 from endoscope_explain.observe.observation import JointObservation, observe, with_held_noise
+from endoscope_explain.options import BAND
 from endoscope_explain.prediction_set import NOTHING, OTHER_NUMBERS, SOMETHING_ELSE, Contest
 from endoscope_explain.recording import RigRecording
 from endoscope_explain.search.screen import background, directions, screened

@@ -9,7 +9,6 @@ from threadpoolctl import threadpool_limits
 
 from endoscope_bags.errors import BagError
 from endoscope_core.physics.description import PlantDescription
-from endoscope_core.rig import Rig
 from endoscope_explain.audit import AuditReport, audit_recording
 from endoscope_explain.case import (
     ChainCut,
@@ -25,7 +24,6 @@ from endoscope_explain.design import propose, what_is_asked
 from endoscope_explain.explain_recording import Progress, explain_recording
 from endoscope_explain.explanation import Explanation, Verdict
 from endoscope_explain.fit.between_rows import with_command_between_rows
-from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.fit.nominal import with_isolated_marked
 from endoscope_explain.locate.locating import (
     cut_at_motor,
@@ -34,33 +32,25 @@ from endoscope_explain.locate.locating import (
     locate_parameters,
     locate_unknown,
 )
+from endoscope_explain.options import Options
 from endoscope_explain.recording import (
     RigRecording,
     recording_from_bag,
     with_unrecorded,
 )
-from endoscope_explain.search.levels import MOST_EFFECTS
 
 Engine = Callable[..., Explanation]
 
 
 @dataclass(frozen=True)
-class Sources:
+class Sources(Options):
     """What one explanation is made from."""
 
     bag: Path  # the recording to explain
     plant: PlantDescription  # the simulation that an engineer has
-    baseline: Path | None = None  # a healthy recording of the same rig
-    validate: Path | None = None  # a second recording of the same rig to judge on
-    without: Collection[str] = ()  # topics that may be missing
-    quick: bool = False  # whether to leave out the next experiment
-    band: float = BAND  # relative tolerance of the plant's parameters
-    most_effects: int = MOST_EFFECTS  # largest number of effects on a joint that are looked for
     given: GivenJoints | None = None  # the physics of each joint, if it is not to be searched
     # By joint, names that other recordings of the rig gave or left open.
     known: Mapping[str, Collection[str]] = field(default_factory=dict)
-    namespace: str | None = None  # of the rig's topics, where a bag has several rigs
-    rig: Rig | None = None  # what was recorded, where that is not what the bag names
     plant_file: Path | None = None  # where the plant was read from
     command: str = ''  # as it was typed
 
@@ -128,7 +118,6 @@ def explain_case(
     inputs: Inputs,
     engine: Engine | None = None,
     *,
-    jobs: int = 2,
     progress: Progress | None = None,
     answered: Callable[[ExplainedCase], None] | None = None,
 ) -> ExplainedCase:
@@ -148,10 +137,10 @@ def explain_case(
             inputs.plant,
             baseline=inputs.baseline,
             band=sources.band,
-            most_effects=sources.most_effects,
+            most_effects=sources.effects,
             given=sources.given,
             known=sources.known,
-            jobs=jobs,
+            jobs=sources.jobs,
             progress=progress,
         )
     plant = improved_plant(explanation, audit)
@@ -180,7 +169,7 @@ def explain_case(
         answered(case)
     if explanation.fit and not sources.quick:
         report('looking for the motion that decides what is left open')
-        case = replace(case, next_experiment=propose(case, what_is_asked(case), jobs))
+        case = replace(case, next_experiment=propose(case, what_is_asked(case), sources.jobs))
     held_out, second = ladders(explanation, validation)
     return replace(case, ladder=held_out, validation=second, runtime_s=time.monotonic() - begun)
 

@@ -73,7 +73,7 @@ class SimulatedRig:
         """Explain the recordings of bags together, as `explain_together` does."""
         inputs = [
             Inputs(
-                Sources(bag, ONE, quick=True, most_effects=1),
+                Sources(bag, ONE, quick=True, effects=1),
                 audit_recording(self.recordings[bag], ONE),
             )
             for bag in bags

@@ -19,7 +19,7 @@ ONE_JOINT = PlantDescription(joints={'bend_x': JointParameters()})
 
 
 def inputs(plant, audit):
-    return Inputs(Sources(Path('rig'), plant, quick=True, most_effects=1), audit)
+    return Inputs(Sources(Path('rig'), plant, quick=True, effects=1, jobs=1), audit)
 
 
 def standing(*quantities, since=0):
@@ -132,7 +132,7 @@ def test_where_nothing_moves_a_report_says_that_there_is_too_little(record, tmp_
     still = {name: replace(s, time=every[name].time) for name, s in still.items()}
     plant = PlantDescription()
     audit = audit_recording(sound.with_series(still), plant)
-    case = explain_case(inputs(plant, audit), jobs=1)
+    case = explain_case(inputs(plant, audit))
     assert case.verdict is Verdict.INSUFFICIENT_DATA
     write_report(case, tmp_path)
     assert 'The recording cannot decide' in (tmp_path / 'report.html').read_text()

@@ -258,11 +258,14 @@ def explained(
 ) -> tuple[ExplainedCase, _Answer]:
     """Explain recordings of one rig together, on one core."""
     inputs = [
-        Inputs(Sources(Path(one.name), plant, quick=True, known=known), audit_recording(one, plant))
+        Inputs(
+            Sources(Path(one.name), plant, quick=True, jobs=1, known=known),
+            audit_recording(one, plant),
+        )
         for one in recordings
     ]
     begun, begun_cpu = time.monotonic(), time.process_time()
-    case = explain_case(inputs_joined(inputs), jobs=1)
+    case = explain_case(inputs_joined(inputs))
     explanation = replace(
         case.explanation, verdict=case.verdict, effects=case.effects, augmented=case.plant
     )

@@ -16,12 +16,7 @@ from endoscope_core.physics.layout import OUT_JOINT
 from endoscope_core.workers import parallel_map
 from endoscope_explain.audit.misreading import OTHER_RIGS
 from endoscope_explain.fit.evidence import is_noise
-from endoscope_explain.fit.free_parameters import (
-    BAND,
-    SCALED_NOMINAL,
-    FreeParameter,
-    nominal_parameters,
-)
+from endoscope_explain.fit.free_parameters import SCALED_NOMINAL, FreeParameter, nominal_parameters
 from endoscope_explain.fit.model import (
     TO_THE_END,
     Fit,
@@ -33,6 +28,7 @@ from endoscope_explain.fit.model import (
 )
 from endoscope_explain.observe.observation import Channel, JointObservation, StampsOnTicks
 from endoscope_explain.observe.predicted_signals import view
+from endoscope_explain.options import BAND
 from endoscope_explain.recording import RigRecording, signal_name
 
 Array = NDArray[np.float64]

@@ -69,11 +69,10 @@ def explain_together(
     progress: Progress | None = None,
 ) -> ExplainedCase:
     """Explain bags of one rig as one recording; BagError if one cannot be used."""
-    plant, file = investigation.plant, investigation.plant_file
-    inputs = [
-        read_inputs(Sources(bag, plant, quick=True, plant_file=file, known=known)) for bag in bags
-    ]
-    return explain_case(inputs_joined(inputs), jobs=investigation.jobs, progress=progress)
+    plant, file, jobs = investigation.plant, investigation.plant_file, investigation.jobs
+    first = Sources(bags[0], plant, quick=True, jobs=jobs, plant_file=file, known=known)
+    inputs = [read_inputs(replace(first, bag=bag)) for bag in bags]
+    return explain_case(inputs_joined(inputs), progress=progress)
 
 
 def investigate(

@@ -181,11 +181,10 @@ def recorded(form: str, seed: int, number: int, effect: str | None, folder: Path
 def explained(number: int, folder: Path, command: str) -> SealedAnswer:
     """Explain a rig from its recordings and the described plant, and write the report."""
     plant = load_plant(folder / PLANT)
-    sources = Sources(
-        folder / RECORDING, plant, validate=folder / SECOND, quick=True, plant_file=folder / PLANT
-    )
+    bag, second, file = (folder / name for name in (RECORDING, SECOND, PLANT))
+    sources = Sources(bag, plant, validate=second, quick=True, jobs=1, plant_file=file)
     inputs = read_inputs(sources)
-    case = explain_case(inputs, jobs=1)
+    case = explain_case(inputs)
     case = replace(case, provenance=provenance(sources.bag, sources.plant_file, command))
     (folder / REPORT).mkdir()
     write_report(case, folder / REPORT)

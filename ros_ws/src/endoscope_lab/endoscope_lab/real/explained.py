@@ -24,7 +24,7 @@ from endoscope_lab.real.takes import OTHERS, STATE, TIGHTENED, TUBES, UNKNOWN_TU
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
 
-MOST_EFFECTS = 3
+MOST_OF_TUBES = 3
 ROUNDS = 4
 """Pooled fits, each started from the result of the last."""
 
@@ -61,7 +61,7 @@ def explained_tubes(folder: Path, jobs: int, report: Report) -> ExplainedTubes:
         log.append(text)
         report(text)
 
-    tried = search(list(zip(fits, described, strict=True)), jobs, MOST_EFFECTS, report=logged)
+    tried = search(list(zip(fits, described, strict=True)), jobs, MOST_OF_TUBES, report=logged)
     named = bool(tried.found.effects) or not tried.levels
     chosen = tried.found if named else tried.levels[-1].best
     explained = chosen.fits
@@ -160,7 +160,7 @@ def explained_state(folder: Path, tubes: ExplainedTubes, jobs: int, report: Repo
         judged.append(JudgedTake(other, 0.0, plants))
     report(f'{take.name}: explaining it alone')
     cycle = Plant.of(before).on(take.until(take.cycle_s).observation()).refitted()
-    decision = decide(search([(cycle,)], jobs, MOST_EFFECTS), jobs)
+    decision = decide(search([(cycle,)], jobs, MOST_OF_TUBES), jobs)
     alone = tuple(term.name for term in decision.missing)
     return OtherState(tuple(judged), after, needed, alone)
 
