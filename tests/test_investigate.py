@@ -12,12 +12,13 @@ from endoscope_bringup import cli
 from endoscope_bringup.demo import live_graph
 from endoscope_bringup.demo.live_graph import NODES, LiveGraph
 from endoscope_core.errors import NotPlayedError, RigStoppedError
+from endoscope_core.names import JOINTS
 from endoscope_core.physics import EffectSpec, PlantDescription, save_plant
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import hold, move, sequence
-from endoscope_core.signals.command_file import JOINTS, CommandTable, write_command_file
+from endoscope_core.signals.command_file import CommandTable, write_command_file
 from endoscope_explain.investigation import tracking
-from endoscope_explain.investigation.motions import Motion
+from endoscope_explain.investigation.motions import RigMotion
 from endoscope_explain.investigation.tracking import held_out, tracked
 from endoscope_nodes.client.graph_parameters import read_parameter
 from endoscope_nodes.client.motion_player import MotionPlayer
@@ -45,7 +46,7 @@ def motion(tmp_path):
     angle = np.stack([signal(time)[0], np.zeros_like(time)], axis=1)
     file = tmp_path / 'motion.csv'
     write_command_file(file, time, angle)
-    return Motion('there and back', 'bend_x', '', CommandTable(JOINTS, time, angle)), file
+    return RigMotion('there and back', 'bend_x', '', CommandTable(JOINTS, time, angle)), file
 
 
 def graph(rig=None, plant=None, folder=None):

@@ -11,10 +11,10 @@ from endoscope_bringup.demo.live_graph import LiveGraph
 from endoscope_core.physics import PlantDescription
 from endoscope_core.rig import shipped_rig
 from endoscope_explain.audit import audit_recording
+from endoscope_explain.case import Sources
 from endoscope_explain.explanation import Verdict
 from endoscope_explain.many_bags import explained_case
 from endoscope_explain.observe.predicted_signals import view
-from endoscope_explain.pipeline import Sources
 from endoscope_explain.recording import SETPOINT, recording_from_bag
 from endoscope_nodes.runtime.private_domain import private_domain
 
@@ -111,7 +111,7 @@ def assert_as_described(bag):
 
 def test_a_motion_cut_out_of_a_session_is_consistent(recorded, tmp_path):
     cut(recorded, tmp_path / 'cut', 5.5, 11.0)
-    case = explained_case(Sources(tmp_path / 'cut', PLANT, quick=True))
+    case = explained_case(Sources(tmp_path / 'cut', PLANT, quick=True, jobs=1))
     assert case.verdict is Verdict.CONSISTENT
     assert case.effects == ()
 

@@ -35,7 +35,7 @@ from endoscope_nodes.names import CLOCK_NODE
 from endoscope_nodes.runtime.node_parameters import OF_NODE, OF_PROCESS
 from endoscope_nodes.runtime.parameters import Described, as_typed, described
 from endoscope_nodes.services import SERVICES, TRIGGER
-from endoscope_nodes.topics import RECORDED, TOPICS, Qos, Topic
+from endoscope_nodes.topics import RECORDED, TOPICS, GraphTopic, Qos
 
 _HERE = Path(__file__).parent
 PAGES = (*sorted(_HERE.rglob('*.md')), _HERE.with_name('security') / 'policy.xml')
@@ -164,7 +164,7 @@ def _topics() -> Iterator[str]:
     )
 
 
-def _speakers(topic: Topic) -> tuple[str, ...]:
+def _speakers(topic: GraphTopic) -> tuple[str, ...]:
     return (
         f'`{topic.name}`',
         _names(topic.said_by) or 'an outside program',

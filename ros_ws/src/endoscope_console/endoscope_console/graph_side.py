@@ -31,7 +31,7 @@ from endoscope_nodes.runtime.environment import joined_node
 from endoscope_nodes.runtime.qos import EVENT
 
 NODE = 'console_web'
-PATIENCE_S = 10.0
+ANSWER_S = 10.0
 
 _ASKED = ('source', 'scale')
 _POLL_S = 0.01
@@ -152,7 +152,7 @@ class GraphSide:
         physical = mode in (PHYSICAL, ADAPTIVE_PHYSICAL)
         by_plant = physical and identified(self.client.calibration)
         values = {'mode': mode, 'selected_by': BY_PLANT if by_plant else BY_CLASS}
-        set_parameters(self.client, 'compensator', values, PATIENCE_S)
+        set_parameters(self.client, 'compensator', values, ANSWER_S)
 
     def log(self, order: str, operator: str, address: str, ok: bool, why: str) -> None:
         """Publish an order and its outcome in the graph."""

@@ -10,26 +10,28 @@ import pytest
 
 from endoscope_core.errors import EndoscopeError, InputError, NotPlayedError, RigStoppedError
 from endoscope_core.investigation_folder import LOG, PAGE, held, is_left_behind
+from endoscope_core.names import JOINTS
 from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
 from endoscope_core.physics.plant_file import load_plant, save_plant
 from endoscope_core.physics.simulator import TICK
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import hold, move, sequence
-from endoscope_core.signals.command_file import JOINTS, CommandTable, read_command_file
+from endoscope_core.signals.command_file import CommandTable, read_command_file
 from endoscope_explain import prediction_set
 from endoscope_explain.audit import audit_recording
+from endoscope_explain.case import Inputs, Sources
 from endoscope_explain.explanation import Verdict
-from endoscope_explain.investigation import page
+from endoscope_explain.investigation import index_page
 from endoscope_explain.investigation.investigation import Investigation, investigate
 from endoscope_explain.investigation.log import LOG_MD, PLANT, Stop, begun
 from endoscope_explain.investigation.motions import (
-    Motion,
     MotionRefusedError,
+    RigMotion,
     commissioning,
     require_allowed,
 )
 from endoscope_explain.observe.revisits import EVERY_S, LEAST_SHARE, seen_before, strokes
-from endoscope_explain.pipeline import Inputs, Sources, explain_case
+from endoscope_explain.pipeline import explain_case
 from endoscope_explain.prediction_set import Contest
 from endoscope_explain.report.visited_once import once_only
 from endoscope_explain.takes import inputs_joined
@@ -72,7 +74,7 @@ class SimulatedRig:
         """Explain the recordings of bags together, as `explain_together` does."""
         inputs = [
             Inputs(
-                Sources(bag, ONE, quick=True, most_effects=1),
+                Sources(bag, ONE, quick=True, effects=1),
                 audit_recording(self.recordings[bag], ONE),
             )
             for bag in bags
@@ -217,7 +219,7 @@ def test_what_breaks_off_loses_nothing_and_is_called_what_it_was(
             both,
             interrupted,
             lambda bags, known: stribeck_case,
-            page=lambda log: page.page(log, both.folder),
+            page=lambda log: index_page.page(log, both.folder),
         )
     kept = log_of(both.folder)
     assert kept['stopped'] == stopped
@@ -332,6 +334,6 @@ def test_a_rig_that_the_plant_answers_with_too_much_tension_is_not_moved():
 def test_a_motion_that_is_too_fast_is_refused():
     time = np.array([0.0, 1.0, 1.1, 2.0])
     angle = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0], [1.0, 0.0]])
-    motion = Motion('jump', 'bend_x', '', CommandTable(JOINTS, time, angle))
+    motion = RigMotion('jump', 'bend_x', '', CommandTable(JOINTS, time, angle))
     with pytest.raises(MotionRefusedError, match='speed is 10 rad/s'):
         require_allowed(motion, RIG)

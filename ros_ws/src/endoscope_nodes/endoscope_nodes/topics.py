@@ -36,7 +36,7 @@ LOCK_STEP = Qos(100)
 
 
 @dataclass(frozen=True)
-class Topic:
+class GraphTopic:
     """A topic of the interface."""
 
     name: str  # relative to the namespace of the graph, ``/endoscope`` by default, or absolute
@@ -65,45 +65,46 @@ _COMMANDS, _RESULTS, _EVENTS, _LOCK_STEPS = ((q, q) for q in (COMMAND, RESULT, E
 
 # fmt: off
 TOPICS = (
-    Topic(names.MASTER_MEASURED, _JOINT_STATE, None, SENSOR_ASKED, (), ('master',),
+    GraphTopic(names.MASTER_MEASURED, _JOINT_STATE, None, SENSOR_ASKED, (), ('master',),
           "1 kHz or the handle's own",
           '`position` of the handle in rad, `bend_x` and `bend_y`', one_sender=True),
-    Topic(names.MASTER_CLUTCH, 'sensor_msgs/msg/Joy', *_EVENTS, ('master',),
+    GraphTopic(names.MASTER_CLUTCH, 'sensor_msgs/msg/Joy', *_EVENTS, ('master',),
           ('master', 'compensator'), 'on change and 10 Hz',
           '`buttons[0]` = 1: follow the handle, or go on with a motion that waits for it '
           "(`hold_to_play`); the master's own while it plays any other motion", one_sender=True),
-    Topic(names.SLAVE_COMMAND, _JOINT_STATE, *_COMMANDS, ('master',), ('compensator', 'controller'),
+    GraphTopic(names.SLAVE_COMMAND, _JOINT_STATE, *_COMMANDS, ('master',), ('compensator',
+          'controller'),
           _STREAM,
           'desired bending: `position` in rad and `velocity` in rad/s of `bend_x` and `bend_y`, '
           "`header.frame_id` the motion session; the master's unless its source is `none`",
           one_sender=True),
-    Topic(names.SLAVE_MEASURED, _JOINT_STATE, *_SENSOR, ('em_tracker',),
+    GraphTopic(names.SLAVE_MEASURED, _JOINT_STATE, *_SENSOR, ('em_tracker',),
           (*_MOVERS, 'calibration', 'instrument_model', 'watch'), '40 Hz',
           'bending by the EM tracker: `position` in rad of `bend_x` and `bend_y`', one_sender=True),
-    Topic(names.MOTOR_COMMAND, _JOINT_STATE, *_COMMANDS, ('compensator',), ('motor_driver',),
+    GraphTopic(names.MOTOR_COMMAND, _JOINT_STATE, *_COMMANDS, ('compensator',), ('motor_driver',),
           _STREAM, 'command to the shafts after compensation: `position` in rad of `motor_x` and '
           '`motor_y`, `header.frame_id` the motion session', one_sender=True),
-    Topic(names.MOTOR_SETPOINT, _JOINT_STATE, *_SENSOR, ('motor_driver',), ('watch',),
+    GraphTopic(names.MOTOR_SETPOINT, _JOINT_STATE, *_SENSOR, ('motor_driver',), ('watch',),
           'on change, 1 kHz in motion, and 20 Hz',
           'what the motor driver made of all commands: `position` in rad to which the shafts '
           '`motor_x` and `motor_y` are sent from the stamp on', one_sender=True),
-    Topic(names.MOTOR_MEASURED, _JOINT_STATE, *_SENSOR, ('motor_driver',),
+    GraphTopic(names.MOTOR_MEASURED, _JOINT_STATE, *_SENSOR, ('motor_driver',),
           (*_MOVERS, 'calibration', 'supervisor', 'watch', 'load_cells'),
           '1 kHz simulated, as the bus carries on hardware',
           '`position` in rad, `velocity` in rad/s and `effort` in N m of the shafts `motor_x` and '
           '`motor_y`', one_sender=True),
-    Topic(names.WIRES_MEASURED, _JOINT_STATE, *_SENSOR, ('load_cells',),
+    GraphTopic(names.WIRES_MEASURED, _JOINT_STATE, *_SENSOR, ('load_cells',),
           ('calibration', 'supervisor', 'watch'),
           '1 kHz simulated, as the transmitter is read on hardware',
           '`effort`: tension in N of `wire_x_pos`, `wire_x_neg`, `wire_y_pos` and `wire_y_neg`',
           one_sender=True),
-    Topic(names.TRACKER_POSE, 'geometry_msgs/msg/PoseStamped', *_SENSOR, ('em_tracker',), (),
+    GraphTopic(names.TRACKER_POSE, 'geometry_msgs/msg/PoseStamped', *_SENSOR, ('em_tracker',), (),
           '40 Hz', "pose of the tip in the frame of the instrument's base: m, and a quaternion"),
-    Topic(names.CALIBRATION_COMMAND, _JOINT_STATE, *_COMMANDS, ('calibration',), _MOVERS,
+    GraphTopic(names.CALIBRATION_COMMAND, _JOINT_STATE, *_COMMANDS, ('calibration',), _MOVERS,
           '1 kHz while it calibrates or goes home',
           '`position` in rad and `velocity` in rad/s of the shafts, divided by the gear; goes '
           'before the master and passes uncompensated', recorded=False, one_sender=True),
-    Topic(names.CALIBRATION_RESULT, _DIAGNOSTICS, *_RESULTS, ('calibration',), _MOVERS,
+    GraphTopic(names.CALIBRATION_RESULT, _DIAGNOSTICS, *_RESULTS, ('calibration',), _MOVERS,
           'once a calibration, latched',
           'status `calibration: hysteresis class`: `class_deg`, `probability`, '
           '`probability_40_deg` to `probability_100_deg`, `backlash_size` in rad, '
@@ -117,7 +118,7 @@ TOPICS = (
           'bend as `reach.bend_x.low` and `reach.bend_x.high` in rad. After an abort the level is '
           'ERROR, with `reason` and `step`; for tensions that neither explains it is ERROR, with '
           '`reason` and `class_deg` `none`, and nothing is compensated', one_sender=True),
-    Topic(names.CALIBRATION_FEEDBACK, _DIAGNOSTICS, *_RESULTS, ('calibration',), (),
+    GraphTopic(names.CALIBRATION_FEEDBACK, _DIAGNOSTICS, *_RESULTS, ('calibration',), (),
           'on change and 10 Hz while it calibrates or goes home, latched',
           'status `calibration: order`, for programs: `order` is `calibrate` or `home`, `id` the '
           'time in ns at which it was given, or just after it where another has that, `state` is '
@@ -126,19 +127,21 @@ TOPICS = (
           '0 to 1, and `code` says why it was aborted or rejected: `busy`, `beyond_reach`, '
           '`no_session`, `session_ended`, `tension_ceiling`, `stream_silent`, `tension_gap`, '
           '`unknown_tube`, `not_judged` or `not_reached`; the message is the same in words'),
-    Topic(names.CALIBRATION_NUMBERS, _JOINT_STATE, *_RESULTS, ('calibration',), (),
+    GraphTopic(names.CALIBRATION_NUMBERS, _JOINT_STATE, *_RESULTS, ('calibration',), (),
           'once a calibration, latched',
           'the figures of `calibration/result` as numbers, for programs that plot: `name` is the '
           'key, `position` the value in SI; `class` in rad, `success` 1 or 0'),
-    Topic(names.CORRECTION, _JOINT_STATE, *_COMMANDS, ('controller',), ('compensator',),
+    GraphTopic(names.CORRECTION, _JOINT_STATE, *_COMMANDS, ('controller',), ('compensator',),
           '1 kHz while commands come',
           'correction by feedback: `position` in rad of `bend_x` and `bend_y`, added to the '
           'command of the shafts divided by the gear', recorded=False, one_sender=True),
-    Topic(names.COMPENSATOR_STATE, _DIAGNOSTICS, *_RESULTS, ('compensator',), (), _LATCHED_STATE,
+    GraphTopic(names.COMPENSATOR_STATE, _DIAGNOSTICS, *_RESULTS, ('compensator',), (),
+          _LATCHED_STATE,
           'status `compensator: model`: `mode` in force, `wanted_mode`, `selected_by`, '
           "`class_deg`, `lead` in s, `gear`, and the mode's parameters of each joint as "
           '`bend_x.…`', one_sender=True),
-    Topic(names.COMPENSATOR_PLANT, _DIAGNOSTICS, *_RESULTS, ('compensator',), ('master', 'watch'),
+    GraphTopic(names.COMPENSATOR_PLANT, _DIAGNOSTICS, *_RESULTS, ('compensator',), ('master',
+          'watch'),
           _LATCHED_STATE,
           'status `compensator: adopted plant`: `hash`, the first digits of the SHA-256 of the '
           'plant file in force, and of the one before as `before`, `left_out` of its inverse, how '
@@ -149,52 +152,57 @@ TOPICS = (
           '`beyond_range`, `moving`, `busy`, `not_measured`, `no_session`, `other_session`, '
           '`other_sender`, `nothing_to_undo` or `withdrawn`; the message is the same in words',
           one_sender=True),
-    Topic(names.COMPENSATOR_ADOPT, _DIAGNOSTICS, *_EVENTS, (), ('compensator',),
+    GraphTopic(names.COMPENSATOR_ADOPT, _DIAGNOSTICS, *_EVENTS, (), ('compensator',),
           'when somebody asks',
           'status `adopt`: `id` of the request and the file as `plant`, empty for the plant '
           'before; `header.frame_id` names the motion session'),
-    Topic(names.OPERATING_STATE, _TEXT, *_RESULTS, ('supervisor',), ('motor_driver',),
+    GraphTopic(names.OPERATING_STATE, _TEXT, *_RESULTS, ('supervisor',), ('motor_driver',),
           'on change and 20 Hz, latched',
           '`DISABLED`, `ENABLED`, `PAUSED` or `FAULT`', one_sender=True),
-    Topic(names.MOTION_SESSION, 'std_msgs/msg/Header', *_EVENTS, ('supervisor',),
+    GraphTopic(names.MOTION_SESSION, 'std_msgs/msg/Header', *_EVENTS, ('supervisor',),
           (*_MOVERS, 'calibration', 'motor_driver'), 'on change and 20 Hz',
           '`frame_id` names the motion session that the last `enable` opened; empty for none',
           one_sender=True),
-    Topic(names.STATE_COMMAND, _TEXT, None, EVENT, (), ('supervisor', 'calibration'),
+    GraphTopic(names.STATE_COMMAND, _TEXT, None, EVENT, (), ('supervisor', 'calibration'),
           'when somebody asks', '`enable`, `disable`, `pause`, `resume` or `home`'),
-    Topic(names.CONSOLE_LOG, _DIAGNOSTICS, *_EVENTS, (), (), 'when somebody asks at a page',
+    GraphTopic(names.CONSOLE_LOG, _DIAGNOSTICS, *_EVENTS, (), (), 'when somebody asks at a page',
           'what was asked for at a page of `endoscope console`, and what became of it: status '
           '`console_web: order` with `operator`, `address`, `order`, `answer` and `why`'),
-    Topic(names.RECORDER_MARK, _TEXT, *_EVENTS, ('watch',), ('recorder',), 'when somebody asks',
+    GraphTopic(names.RECORDER_MARK, _TEXT, *_EVENTS, ('watch',), ('recorder',),
+          'when somebody asks',
           'an operator, or the watch, marks this moment, in words or with an empty text: the '
           'recorder writes what came before and the 2 s after as a bag'),
-    Topic(names.SIMULATED_WIRES, _JOINT_STATE, *_LOCK_STEPS, ('motor_driver',), ('load_cells',),
+    GraphTopic(names.SIMULATED_WIRES, _JOINT_STATE, *_LOCK_STEPS, ('motor_driver',),
+          ('load_cells',),
           _STREAM,
           'what the simulated slave shows its simulated load cells, without noise: `effort` in N',
           recorded=False),
-    Topic(names.SIMULATED_BENDING, _JOINT_STATE, *_LOCK_STEPS, ('motor_driver',), ('em_tracker',),
+    GraphTopic(names.SIMULATED_BENDING, _JOINT_STATE, *_LOCK_STEPS, ('motor_driver',),
+          ('em_tracker',),
           _STREAM,
           'what the simulated slave shows its simulated tracker, without noise: `position` in rad',
           recorded=False),
-    Topic(names.RIG_KIND, _TEXT, *_RESULTS, ('motor_driver',), (), 'once and on change, latched',
+    GraphTopic(names.RIG_KIND, _TEXT, *_RESULTS, ('motor_driver',), (), 'once and on change,
+          latched',
           'what the rig is, as YAML: `kind` `simulated`, `emulated` (servos that this project '
           'emulates) or `real`, `program` and its version, `rig_sha256` of its `rig.yaml`, and of '
           'a simulated one `plant` and `plant_sha256`; every recording has it'),
-    Topic(names.ROBOT_DESCRIPTION, _TEXT, *_RESULTS, ('instrument_model',), (), 'once, latched',
+    GraphTopic(names.ROBOT_DESCRIPTION, _TEXT, *_RESULTS, ('instrument_model',), (), 'once,
+          latched',
           'the instrument as URDF for programs that draw robots: insertion tube, bending section '
           'as a chain of vertebrae, tip and wires, of cylinders and spheres alone'),
-    Topic(names.ROBOT_DESCRIPTION_OF_ALL, _TEXT, *_RESULTS, ('instrument_model',), (),
+    GraphTopic(names.ROBOT_DESCRIPTION_OF_ALL, _TEXT, *_RESULTS, ('instrument_model',), (),
           'once, latched', 'the same where viewers look for it first'),
-    Topic(names.JOINT_STATES, _JOINT_STATE, *_SENSOR, ('instrument_model',), (), '20 Hz',
+    GraphTopic(names.JOINT_STATES, _JOINT_STATE, *_SENSOR, ('instrument_model',), (), '20 Hz',
           'the measured bending as `position` in rad of every joint of `robot_description`, '
           '`vertebra_01_x` and so on'),
-    Topic(names.TRANSFORMS, 'tf2_msgs/msg/TFMessage', SENSOR_OFFERED, SENSOR_OFFERED,
+    GraphTopic(names.TRANSFORMS, 'tf2_msgs/msg/TFMessage', SENSOR_OFFERED, SENSOR_OFFERED,
           ('instrument_model',), (), '20 Hz',
           'where every link of `robot_description` is, from the base to the tip of the instrument'),
-    Topic(names.DIAGNOSTICS, _DIAGNOSTICS, *_EVENTS, ('every node',), ('supervisor',),
+    GraphTopic(names.DIAGNOSTICS, _DIAGNOSTICS, *_EVENTS, ('every node',), ('supervisor',),
           '1 Hz, and at once when a node is in trouble',
           'health of every node, as `/endoscope/NODE: subcomponent`'),
-    Topic(names.CLOCK, 'rosgraph_msgs/msg/Clock', LOCK_STEP, SENSOR_ASKED,
+    GraphTopic(names.CLOCK, 'rosgraph_msgs/msg/Clock', LOCK_STEP, SENSOR_ASKED,
           ('simulation_clock', 'replay'), ('every node',),
           'every simulated millisecond, in simulated time only',
           'the simulated time', recorded=False),

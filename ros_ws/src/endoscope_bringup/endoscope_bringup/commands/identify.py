@@ -10,9 +10,9 @@ from endoscope_core.choices import HYSTERESIS_MODELS, PHYSICAL
 from endoscope_core.errors import FileError
 
 if TYPE_CHECKING:
-    from endoscope_bags import Recording as Bag
+    from endoscope_bags import Recording
     from endoscope_core.hysteresis.inverse import HysteresisParameters
-    from endoscope_core.identification import Recording, UpdatedTable
+    from endoscope_core.identification import HysteresisRecording, UpdatedTable
 
 MODELS = (*HYSTERESIS_MODELS, PHYSICAL)
 
@@ -89,7 +89,7 @@ def _of_bag(args: argparse.Namespace) -> dict[str, object]:
     return {'schema': 1, 'model': args.model, 'lead': lead, 'seed': args.seed, 'joints': joints}
 
 
-def _bag_and_gear(args: argparse.Namespace) -> tuple['Bag', float]:
+def _bag_and_gear(args: argparse.Namespace) -> tuple['Recording', float]:
     from endoscope_bags import open_bag
     from endoscope_bags.recording import rig_of_bag
 
@@ -131,7 +131,7 @@ def _table(args: argparse.Namespace) -> 'UpdatedTable | None':
 
 def _extend(
     args: argparse.Namespace,
-    recording: 'Recording',
+    recording: 'HysteresisRecording',
     parameters: 'HysteresisParameters',
     source: str,
 ) -> None:

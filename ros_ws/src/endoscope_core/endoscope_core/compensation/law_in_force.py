@@ -21,7 +21,7 @@ class Selection(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Before:
+class BeforeAdoption:
     """What was in force before a plant was adopted."""
 
     plant: AdoptedPlant | None  # None where it was no adopted one
@@ -45,7 +45,7 @@ class LawInForce:
         self.error = ''  # why the mode is not available
         self.changed = True  # whoever reports what is in force takes it back
         self._choice = choice
-        self._before: list[Before] = []
+        self._before: list[BeforeAdoption] = []
         self._by_adopted = False
         try:
             feedforward.compile(choice.law(selection.mode, BY_CLASS, _ANY_CLASS))
@@ -65,7 +65,7 @@ class LawInForce:
         return () if self.findings is None else self.findings.ranges
 
     @property
-    def before(self) -> Before | None:
+    def before(self) -> BeforeAdoption | None:
         """What :meth:`undo` puts in force again; None where no plant has been adopted."""
         return self._before[-1] if self._before else None
 
@@ -96,7 +96,7 @@ class LawInForce:
 
     def adopt(self, plant: AdoptedPlant, for_session: bool) -> None:
         """Have a plant for the next selection; `for_session` as the selection in force is."""
-        self._before.append(Before(self.plant, self.selection, for_session))
+        self._before.append(BeforeAdoption(self.plant, self.selection, for_session))
         self.plant = plant
 
     def undo(self) -> None:

@@ -50,9 +50,9 @@ def tip_pose(bending: ArrayLike, length: float) -> tuple[Array, Array]:
 
 
 def tip_lever(bending: ArrayLike, length: float) -> float:
-    """Way of the tip across its own axis for one radian of bending, m.
+    """Way of the tip across its own axis for a radian of bending, m.
 
-    The same in every direction: ``length (1 - cos(a)) / a**2`` for a bending (2,) of `a` rad in all.
+    The same in every direction: ``length (1 - cos(a)) / a**2``, bent (2,) by `a` rad in all.
     So a moment on a joint is the force across the tip times this lever (virtual work).
     """
     angle = math.hypot(*np.atleast_1d(np.asarray(bending, dtype=float)))

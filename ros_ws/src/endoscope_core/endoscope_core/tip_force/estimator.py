@@ -33,8 +33,8 @@ _BOUND = 2.0
 LONGEST_GAP_S = 0.15
 """Of motors, wires or tracker; after a longer one the memory of the sheaths is unknown."""
 SWEEPS, LEAST_RANGE_RAD = 2.0, 0.3
-"""Travel over the visited range, and that range in rad of the shaft, after which a joint's memory is
-that of the path: once to either end of it (return-point memory; Mayergoyz, 1991, ch. I)."""
+"""Travel over the visited range, and that range in rad of the shaft, after which a joint's memory
+is that of the path: once to either end of it (return-point memory; Mayergoyz, 1991, ch. I)."""
 COVERED = 0.95
 """Share of free motion in which zero lies within the bounds."""
 BEYOND_FREE = 1.5
@@ -231,7 +231,7 @@ class TipForceEstimator:
             samples.clear()
 
     def _judge(self, end: float) -> TipForce | None:
-        ticks = end + TICK_S * np.arange(1 - BLOCK_TICKS, 1)
+        ticks: Array = end + TICK_S * np.arange(1 - BLOCK_TICKS, 1, dtype=np.float64)
         shafts = self.motor.between(ticks)
         tensions = self.wires.between(np.array([end]))[0].reshape(-1, 2)
         around = end + np.linspace(-AHEAD_S, AHEAD_S, _AVERAGED)
