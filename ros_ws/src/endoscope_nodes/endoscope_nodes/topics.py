@@ -182,13 +182,13 @@ TOPICS = (
           _STREAM,
           'what the simulated slave shows its simulated tracker, without noise: `position` in rad',
           recorded=False),
-    GraphTopic(names.RIG_KIND, _TEXT, *_RESULTS, ('motor_driver',), (), 'once and on change,
-          latched',
+    GraphTopic(names.RIG_KIND, _TEXT, *_RESULTS, ('motor_driver',), (),
+          'once and on change, latched',
           'what the rig is, as YAML: `kind` `simulated`, `emulated` (servos that this project '
           'emulates) or `real`, `program` and its version, `rig_sha256` of its `rig.yaml`, and of '
           'a simulated one `plant` and `plant_sha256`; every recording has it'),
-    GraphTopic(names.ROBOT_DESCRIPTION, _TEXT, *_RESULTS, ('instrument_model',), (), 'once,
-          latched',
+    GraphTopic(names.ROBOT_DESCRIPTION, _TEXT, *_RESULTS, ('instrument_model',), (),
+          'once, latched',
           'the instrument as URDF for programs that draw robots: insertion tube, bending section '
           'as a chain of vertebrae, tip and wires, of cylinders and spheres alone'),
     GraphTopic(names.ROBOT_DESCRIPTION_OF_ALL, _TEXT, *_RESULTS, ('instrument_model',), (),
