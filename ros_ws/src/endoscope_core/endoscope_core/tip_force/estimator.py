@@ -65,6 +65,9 @@ class TipForce:
         for a joint that the plant does not have.
     low, high : array (2,)
         Bounds of both in N.
+    widened : array (2,)
+        By how much motion in free space has widened the bounds on either side, N; the rest of them
+        is what friction leaves open.
     visible : float
         Smallest force in N that would be seen now.
     seen : bool
@@ -75,6 +78,7 @@ class TipForce:
     force: Array
     low: Array
     high: Array
+    widened: Array
     visible: float
     seen: bool
 
@@ -148,7 +152,7 @@ class TipForceEstimator:
         lasting = [e for e in plant.effects if not describe(e.id).traits.depends_on_time]
         self._plant = replace(plant, effects=tuple(lasting))
         self._parameters, self._on = pack(self._plant)
-        self._length = section_length
+        self.section_length = section_length
         self._noise = plant.sensors.tracker_noise
         count = len(self._parameters)
         self.motor, self.wires = Samples(count), Samples(2 * count)
@@ -266,15 +270,16 @@ class TipForceEstimator:
         return self._force(end, angles, sets)
 
     def _force(self, time: float, angles: list[float], sets: list[MomentSet]) -> TipForce:
-        lever = tip_lever(angles, self._length)
-        force, low, high = (np.full(2, math.nan) for _ in range(3))
+        lever = tip_lever(angles, self.section_length)
+        force, low, high, widened = (np.full(2, math.nan) for _ in range(4))
         touched, visible = False, 0.0
         for j, (joint, moments) in enumerate(zip(self._joints, sets, strict=True)):
             force[j] = moments.likely / lever
-            low[j] = (moments.low - joint.bound) / lever
-            high[j] = (moments.high + joint.bound) / lever
+            widened[j] = joint.bound / lever
+            low[j] = moments.low / lever - widened[j]
+            high[j] = moments.high / lever + widened[j]
             touched |= max(moments.low, -moments.high) > joint.least_seen
             half = 0.5 * (moments.high - moments.low)
             visible = max(visible, (half + joint.least_seen) / lever)
         self._beyond = self._beyond + 1 if touched else 0
-        return TipForce(time, force, low, high, visible, self._beyond > 1)
+        return TipForce(time, force, low, high, widened, visible, self._beyond > 1)
