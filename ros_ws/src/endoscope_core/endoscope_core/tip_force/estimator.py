@@ -30,8 +30,11 @@ this long before and after."""
 _AVERAGED = 5
 _BOUND = 2.0
 """Standard deviations of that mean within which the angle is."""
-LONGEST_GAP_S = 0.15
-"""Of motors, wires or tracker; after a longer one the memory of the sheaths is unknown."""
+_GAP_S, _TRACKER_GAP_S = 0.05, 0.15
+"""Longest of motors and load cells, and of the tracker; after a longer one the memory of the
+sheaths is unknown."""
+_LATE_S = 0.3
+"""Largest latency of samples."""
 SWEEPS, LEAST_RANGE_RAD = 2.0, 0.3
 """Travel over the visited range, and that range in rad of the shaft, after which a joint's memory
 is that of the path: once to either end of it (return-point memory; Mayergoyz, 1991, ch. I)."""
@@ -157,6 +160,7 @@ class TipForceEstimator:
         count = len(self._parameters)
         self.motor, self.wires = Samples(count), Samples(2 * count)
         self.tracker = Samples(count)
+        self._streams = {'motors': self.motor, 'load cells': self.wires, 'tracker': self.tracker}
         self._joints: list[_Joint] = []
         self._learnt: list[tuple[float, float]] = []
         self._end = math.nan
@@ -180,41 +184,48 @@ class TipForceEstimator:
 
     def update(self, until: float) -> list[TipForce]:
         """Forces since the last call, from samples that are complete at a time in s."""
-        streams = {'motors': self.motor, 'load cells': self.wires, 'tracker': self.tracker}
         found: list[TipForce] = []
-        if not all(samples.in_order for samples in streams.values()):
-            self._restart('the time of the samples has jumped back')
-        if not self._joints and not self._started():
-            return found
-        latest = AHEAD_S + max(joint.delay_s for joint in self._joints)
-        while True:
-            begin, end = self._end, self._end + BLOCK_S
-            enough = min(
-                (*self.motor.time[-1:], *self.wires.time[-1:], self.tracker.time[-1] - latest),
-            )
-            if enough < end and until < end + latest + LONGEST_GAP_S:
-                return found
-            for name, samples in streams.items():
-                flaw = samples.flaw(begin, end, LONGEST_GAP_S)
-                if flaw:
-                    self._restart(f'{name} were {flaw}'.replace('were no', 'gave no'))
-                    return found
+        if not all(samples.in_order for samples in self._streams.values()):
+            self._restart('the time of the samples has jumped back', math.inf)
+        while self._joints or self._started():
+            end = self._end + BLOCK_S
+            latest = end + AHEAD_S + max(joint.delay_s for joint in self._joints)
+            complete = self.motor.time[-1:] >= end and self.wires.time[-1:] >= end
+            if not (complete and self.tracker.time[-1:] >= latest) and until < latest + _LATE_S:
+                break
+            flaw = self._flaw(end, latest)
+            if flaw:
+                self._restart(flaw, latest)
+                continue
             force = self._judge(end)
             if force is not None:
                 found.append(force)
             self._end = end
-            for samples in streams.values():
-                samples.drop(begin - AHEAD_S)
+            for samples in self._streams.values():
+                samples.drop(end - AHEAD_S)
+        return found
+
+    def _flaw(self, end: float, latest: float) -> str:
+        """Why the samples do not show a block, in words; empty if they do."""
+        ends = {'tracker': (latest, _TRACKER_GAP_S)}
+        for name, samples in self._streams.items():
+            last, longest = ends.get(name, (end, _GAP_S))
+            flaw = samples.flaw(self._end, last, longest)
+            if flaw:
+                return f'{name} were {flaw}'.replace('were no', 'gave no')
+        return ''
 
     def _started(self) -> bool:
-        if not all(len(s.time) for s in (self.motor, self.wires, self.tracker)):
+        for samples in self._streams.values():
+            # Silent to begin with, or without numbers.
+            kept = np.isfinite(samples.values).all(axis=1)
+            samples.time, samples.values = samples.time[kept], samples.values[kept]
+        if not all(len(samples.time) for samples in self._streams.values()):
             return False
         first = max(self.motor.time[0], self.wires.time[0], self.tracker.time[0] + AHEAD_S)
         if self.motor.time[-1] < first:
             return False
         shafts = self.motor.between(np.array([first]))[0]
-        if not np.isfinite(shafts).all():
-            return False
         for j, (p, on) in enumerate(zip(self._parameters, self._on, strict=True)):
             delay_s = float(p[TRACKER_DELAY.first_parameter]) if on[TRACKER_DELAY.flag] else 0.0
             joint = _Joint(ExternalMoment(p, on, float(shafts[j])), delay_s)
@@ -224,15 +235,17 @@ class TipForceEstimator:
         self._end = first
         return True
 
-    def _restart(self, because: str) -> None:
-        """Begin with an unknown memory; bounds that were learnt stay."""
-        self._learnt = [(joint.bound, joint.least_seen) for joint in self._joints]
+    def _restart(self, because: str, after: float) -> None:
+        """Begin after a time with an unknown memory; bounds that were learnt stay."""
+        if self._joints:
+            self._learnt = [(joint.bound, joint.least_seen) for joint in self._joints]
         self._joints, self._beyond = [], 0
         self.state = State.NO_SAMPLES
         self.restarts += 1
         self.restarted_because = because
-        for samples in (self.motor, self.wires, self.tracker):
-            samples.clear()
+        for samples in self._streams.values():
+            kept = samples.time > after
+            samples.time, samples.values = samples.time[kept], samples.values[kept]
 
     def _judge(self, end: float) -> TipForce | None:
         ticks: Array = end + TICK_S * np.arange(1 - BLOCK_TICKS, 1, dtype=np.float64)

@@ -27,7 +27,7 @@ from endoscope_explain.recording import (
     MOTOR,
     MOVES_RAD,
     WIRES,
-    Recording,
+    RigRecording,
     motor_name,
     wire_names,
 )
@@ -54,13 +54,13 @@ CHI_SQUARED_90 = 2.706
 
 
 def channel_delays(
-    recording: Recording, plant: PlantDescription, jobs: int = 2
+    recording: RigRecording, plant: PlantDescription, jobs: int = 2
 ) -> tuple[ChannelDelay, ...]:
     """Return the delay of every measured channel, or why it is unknown.
 
     Parameters
     ----------
-    recording : Recording
+    recording : RigRecording
         As audited.
     plant : PlantDescription
         With the joints of the recording; its effects are in force, and delays among them are where
@@ -135,7 +135,7 @@ def _unknown(joint: str, quantities: Iterable[str], why: str) -> list[ChannelDel
     return [ChannelDelay(c, STAMP, unknown=why) for q in quantities for c in _names(joint, q)]
 
 
-def _shafts(recording: Recording) -> list[ChannelDelay | None]:
+def _shafts(recording: RigRecording) -> list[ChannelDelay | None]:
     """Delay of each joint's shaft; None where it was not recorded."""
     shaft, command = recording.shaft_position, recording.command
     found: list[ChannelDelay | None] = []

@@ -164,10 +164,11 @@ def _compensated(plant: PlantDescription, shaft: Array) -> Array:
 
 def _watched(estimator: TipForceEstimator, recording: RigRecording, later: float) -> list[TipForce]:
     """Forces from a recording whose stamps are later by so many s, in portions as they arrive."""
+    measured = recording.measured()
     streams = (
-        (estimator.motor, recording.shaft_position),
-        (estimator.wires, recording.tension),
-        (estimator.tracker, recording.bending),
+        (estimator.motor, measured['shaft_position']),
+        (estimator.wires, measured['tension']),
+        (estimator.tracker, measured['bending']),
     )
     found = []
     for begin in np.arange(0.0, recording.duration, _PORTION_S):

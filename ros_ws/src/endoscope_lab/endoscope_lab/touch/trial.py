@@ -5,11 +5,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from endoscope_core.tip_force.estimator import AHEAD_S, BLOCK_S
 from endoscope_lab.bench import keep_row, report, rows_so_far, side_by_side, table_head, table_row
-from endoscope_lab.touch.touched_rig import SIMULATORS, Array, Touched, touched
+from endoscope_lab.touch.touched_rig import SIMULATORS, Touched, touched
 
 REPORTED_WITHIN_S = 0.3
 TWICE = 2.0
@@ -81,7 +82,7 @@ def _row(found: Touched, simulator: str, seed: int, obstacle: bool) -> Row:
     near = np.convolve(touching, np.ones(parted + 1))[: len(touching)] > 0.0
     alarms = np.diff((seen & ~near).astype(int), prepend=0) > 0
 
-    def of_touch(errors: Array, share: float) -> float:
+    def of_touch(errors: NDArray[np.float64], share: float) -> float:
         sizes = errors.max(axis=1)[touching]
         return float(np.quantile(sizes, share)) / largest if len(sizes) else 0.0
 
@@ -106,7 +107,7 @@ def _row(found: Touched, simulator: str, seed: int, obstacle: bool) -> Row:
     )
 
 
-def _contacts(touching: Array) -> list[int]:
+def _contacts(touching: NDArray[np.bool_]) -> list[int]:
     """Where contacts begin that last as long as they may take to report."""
     edges = np.diff(np.concatenate([[0], touching.astype(int), [0]]))
     begins, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
@@ -138,7 +139,11 @@ def _print(rows: Sequence[Row]) -> None:
                 f'{np.mean([r.held for r in mine]):.1%}',
                 f'{np.mean([r.held_in_touch for r in touching]):.1%}',
                 f'{reported} of {contacts}',
-                f'{sum(r.false_alarms for r in mine)} in {sum(r.free_s for r in mine) / 3600:.1f} h',
+                f'{sum(r.false_alarms for r in mine)} in {_hours(mine):.1f} h',
             )
         )
     print('Errors: median of the rigs, and 90 % of samples in 90 % of the rigs.')
+
+
+def _hours(rows: Sequence[Row]) -> float:
+    return sum(row.free_s for row in rows) / 3600.0
