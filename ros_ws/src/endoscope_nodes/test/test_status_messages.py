@@ -23,7 +23,7 @@ from endoscope_nodes.client.calibration_result import (
     successful_result,
 )
 from endoscope_nodes.client.order_feedback import feedback_message, feedback_of
-from endoscope_nodes.client.plant_adoption import AdoptionRequest, PlantInForce
+from endoscope_nodes.client.plant_adoption import AdoptionRequest, PlantInForce, Reach
 from endoscope_nodes.runtime.diagnostics import OK, diagnostic_array, status
 
 STAMP = 12_345_678_901
@@ -123,6 +123,7 @@ def test_calibrations_that_failed():
     'broken',
     [
         *({}, {'class_deg': 'many'}, {'class_deg': 70, 'regressed_size': 'wide'}),
+        {'class_deg': 70, 'regressed_size.low': 0.1},
         {'class_deg': 70, 'reach.bend_x.low': 0.0},
         {'class_deg': 70, 'reach.bend_x.low': 0.0, 'reach.bend_x.high': 1.0},
         {'class_deg': 70, 'bend_x.pretension': 5.0},
@@ -179,7 +180,7 @@ def test_the_plant_in_force():
         hash='abc',
         before='def',
         left_out=('breathing of bend_y', 'a "b"'),
-        ranges=(BendingRange(-1.0 / 4.0, 0.5), BendingRange(0, 1)),
+        reach=Reach(BendingRange(-0.25, 0.5), BendingRange(0, 1)),
         words='plant abc adopted',
         id='17',
         state=OrderState.REJECTED,
@@ -199,7 +200,15 @@ def test_the_plant_in_force():
         ('compensator: adoption', 2, 'busy', asked),
     ]
     assert PlantInForce.of_message(message) == plant
-    message.status[0].values[-2].value = 'far'
+    for key, odd in (('reach.bend_y.high', 'far'), ('left_out', 'all'), ('left_out', '[[1]]')):
+        told = plant.message(STAMP, 'session-3')
+        next(item for item in told.status[0].values if item.key == key).value = odd
+        assert PlantInForce.of_message(told) is None
+    for k in range(8):
+        told = plant.message(STAMP, 'session-3')
+        told.status[0].values.pop(k)
+        assert PlantInForce.of_message(told) is None
+    message.status[0].values[2].key = 'left_out.first'
     assert PlantInForce.of_message(message) is None
     del message.status[0]
     assert PlantInForce.of_message(message) is None
