@@ -140,13 +140,15 @@ def test_the_site_needs_no_network(site: Path) -> None:
 
 
 def test_pages_keep_what_the_code_says(tmp_path: Path) -> None:
-    doc = shutil.copytree(WORKSPACE / 'doc', tmp_path / 'doc')
-    script = [sys.executable, doc / 'reference_pages.py']
+    for room in ('doc', 'security'):
+        shutil.copytree(WORKSPACE / room, tmp_path / room)
+    script = [sys.executable, tmp_path / 'doc/reference_pages.py']
     subprocess.run(script, check=True, env=os.environ | {'COLUMNS': '30'})
     stale = [
-        str(page.relative_to(doc))
-        for page in sorted(doc.rglob('*.md'))
-        if page.read_text() != (WORKSPACE / 'doc' / page.relative_to(doc)).read_text()
+        str(page.relative_to(tmp_path))
+        for page in sorted(tmp_path.rglob('*'))
+        if page.suffix in ('.md', '.xml')
+        and page.read_text() != (WORKSPACE / page.relative_to(tmp_path)).read_text()
     ]
     assert stale == [], 'run `make -C ros_ws reference` and commit what it writes'
 
