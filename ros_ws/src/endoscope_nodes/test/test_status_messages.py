@@ -24,7 +24,7 @@ from endoscope_nodes.client.calibration_result import (
     successful_result,
 )
 from endoscope_nodes.client.order_feedback import feedback_message, feedback_of
-from endoscope_nodes.client.plant_adoption import AdoptionRequest, PlantInForce
+from endoscope_nodes.client.plant_adoption import AdoptionRequest, PlantInForce, Reach
 from endoscope_nodes.runtime.diagnostics import OK, diagnostic_array, status
 
 STAMP = 12_345_678_901

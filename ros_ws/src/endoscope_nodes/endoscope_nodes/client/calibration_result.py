@@ -14,7 +14,7 @@ from endoscope_core.calibration import with_zeros
 from endoscope_core.control import MotorLimits, PhysicalParameters, bending_range
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.physics import JointParameters
-from endoscope_core.safety import BendingRange
+from endoscope_nodes.client.plant_adoption import Reach
 from endoscope_nodes.names import JOINTS, WIRES
 from endoscope_nodes.runtime.diagnostics import (
     ERROR,
@@ -120,14 +120,6 @@ def is_of_no_class(message: DiagnosticArray) -> bool:
         item.name == NAME and texts_of(item).get('class_deg') == NONE_OF_THEM
         for item in message.status
     )
-
-
-@dataclass(frozen=True)
-class Reach:
-    """How far each joint can be bent, rad."""
-
-    bend_x: BendingRange
-    bend_y: BendingRange
 
 
 @dataclass(frozen=True)

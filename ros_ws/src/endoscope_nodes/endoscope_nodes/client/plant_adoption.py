@@ -64,6 +64,14 @@ class AdoptionRequest:
 
 
 @dataclass(frozen=True)
+class Reach:
+    """How far each joint can be bent, rad."""
+
+    bend_x: BendingRange
+    bend_y: BendingRange
+
+
+@dataclass(frozen=True)
 class PlantInForce:
     """The adopted plant of a compensator, and what became of the last request."""
 

@@ -12,8 +12,7 @@ from endoscope_core.compensation.law_in_force import LawInForce, Selection
 from endoscope_core.control import AdoptedPlant, AdoptionError, adopted_plant
 from endoscope_core.safety import AdoptionCode
 from endoscope_nodes import names
-from endoscope_nodes.client.calibration_result import Reach
-from endoscope_nodes.client.plant_adoption import AdoptionRequest, PlantInForce
+from endoscope_nodes.client.plant_adoption import AdoptionRequest, PlantInForce, Reach
 from endoscope_nodes.runtime.beside import Beside
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_parameters import FOR_SESSION
