@@ -19,6 +19,18 @@ class Service:
 
 SERVICES = (
     Service(
+        names.SLAVE_STOP,
+        'supervisor',
+        'ends the motion session as `pause` does: the measured position is held; without a session '
+        'nothing changes',
+    ),
+    Service(
+        names.SLAVE_HOME,
+        'calibration',
+        f'takes the motors to zero as `home` does, which needs an enabled slave; '
+        f'{names.CALIBRATION_FEEDBACK} says how it fares',
+    ),
+    Service(
         names.CALIBRATION_RUN,
         'calibration',
         f'begins a calibration, which needs an enabled slave; {names.CALIBRATION_RESULT} says how '

@@ -89,10 +89,35 @@ TOPICS = (
         _JOINT_STATE,
         _STREAM,
         'desired bending: `position` in rad and `velocity` in rad/s of `bend_x` and `bend_y`, '
-        "`header.frame_id` the motion session; the master's unless its source is `none`",
+        "`header.frame_id` the motion session; the master's unless its source is `none` and nobody "
+        'commands velocities',
         *_COMMANDS,
         said_by=('master',),
         heard_by=('compensator', 'controller'),
+        one_sender=True,
+    ),
+    Topic(
+        names.SLAVE_VELOCITY,
+        _JOINT_STATE,
+        'more than 10 Hz',
+        'desired velocity of bending: `velocity` in rad/s of `bend_x` and `bend_y`, '
+        '`header.frame_id` the motion session; obeyed while the clutch is held and `master.source` '
+        'is `none`, zero after 150 ms of silence',
+        offered=None,
+        asked=COMMAND,
+        heard_by=('master',),
+        one_sender=True,
+    ),
+    Topic(
+        names.TIP_VELOCITY,
+        'geometry_msgs/msg/TwistStamped',
+        'more than 10 Hz',
+        f"instead of `{names.SLAVE_VELOCITY}`, velocity of the tip in the tip's frame: "
+        '`angular.x` and `angular.y` in rad/s or, where both are zero, `linear.x` and `linear.y` '
+        'in m/s; the rest is ignored and reported; `header.frame_id` the motion session',
+        offered=None,
+        asked=COMMAND,
+        heard_by=('master',),
         one_sender=True,
     ),
     Topic(
