@@ -201,6 +201,19 @@ def test_a_second_sender_of_motion_on_any_topic_is_a_fault_that_names_both(graph
     assert graph.command('enable') == 'ENABLED'
 
 
+def test_a_velocity_that_outlives_its_sender_is_not_obeyed(graph, stick):
+    stick.move(0.2, (0.1, 0.0))
+    refused = graph.nodes['master'].motion.velocities.gate.refused
+    before = refused[Refusal.SENDER]
+    rival = graph.speak(JointState, SLAVE_VELOCITY, COMMAND)
+    rival.publish(stick.message((2.0, 2.0)))
+    graph.probe.destroy_publisher(rival)
+    graph.advance(0.1)
+    assert refused[Refusal.SENDER] > before
+    assert graph.state == 'FAULT'
+    assert max(max(desired.velocity) for desired in graph.desired) == pytest.approx(0.1)
+
+
 @pytest.mark.parametrize('topic', [SLAVE_VELOCITY, TIP_VELOCITY])
 def test_who_speaks_beside_a_master_that_plays_ends_the_session(topic):
     with run(overrides={'master': {'source': 'motion'}}) as graph:
@@ -260,13 +273,15 @@ def test_stop_ends_the_session_and_the_slave_holds(graph, stick):
 
 
 def test_home_takes_the_motors_to_zero_or_says_why_not(graph, stick):
-    stick.move(0.6, (0.5, 0.0))
+    stick.move(0.2, (0.5, 0.0))
     stick.clutch = 0
     stick.grip()
     answer = ask(graph, SLAVE_HOME)
     assert answer.success
-    graph.advance(3.0)
-    assert 'home reached' in graph.reported('calibration: procedure')['last']
+    calibration = graph.nodes['calibration']
+    while calibration.active:
+        graph.advance(0.2)
+    assert 'home reached' in calibration.orders.last
     assert graph.state == 'ENABLED'
     assert graph.diagnostics['master: velocities'][-1].level == OK
     graph.command('disable')
