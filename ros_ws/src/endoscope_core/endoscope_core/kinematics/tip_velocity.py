@@ -14,7 +14,6 @@ from typing import NamedTuple
 from endoscope_core.kinematics.constant_curvature import Vector
 
 _SMALL = 1e-6
-_ACROSS, _ALONG = slice(0, 2), 2
 
 
 class TipVelocity(NamedTuple):
@@ -26,10 +25,10 @@ class TipVelocity(NamedTuple):
     @property
     def ignored(self) -> str:
         """Say what two bending angles cannot follow, or what the angular velocity decides."""
-        turns, moves = any(self.angular[_ACROSS]), any(self.linear[_ACROSS])
+        turns, moves = any(self.angular[:2]), any(self.linear[:2])
         parts = {
-            'linear.z': self.linear[_ALONG],
-            'angular.z': self.angular[_ALONG],
+            'linear.z': self.linear[2],
+            'angular.z': self.angular[2],
             'linear.x and linear.y beside angular.x and angular.y': turns and moves,
         }
         return ', '.join(part for part, asked in parts.items() if asked)
