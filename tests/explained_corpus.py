@@ -22,9 +22,8 @@ from short_bags import PLANT, one_joint, write_short_bag
 from endoscope_core.physics import EffectSpec, JointParameters, PlantDescription
 from endoscope_core.physics.description import TermSpec
 from endoscope_explain import many_bags, pipeline
-from endoscope_explain.case import ExplainedCase
-from endoscope_explain.pipeline import Sources
-from endoscope_explain.recording import Recording
+from endoscope_explain.case import ExplainedCase, Sources
+from endoscope_explain.recording import RigRecording
 
 WORKSPACE = Path(__file__).parents[1] / 'ros_ws'
 KEPT = WORKSPACE / 'build' / 'explained'
@@ -49,7 +48,7 @@ CORPUS = {
     'other_numbers': Made(replace(PLANT, joints={'bend_x': OTHER})),
     'stopped': Made(one_joint(STOP), {'seed': 2}),
     'cell': Made(one_joint(GAIN)),
-    'unknown': Made(replace(PLANT, terms=(LAW,)), {'duration': 7.0}, {'most_effects': 1}),
+    'unknown': Made(replace(PLANT, terms=(LAW,)), {'duration': 7.0}, {'effects': 1}),
     'two_joints': Made(PlantDescription(effects=(STOP,))),
     'again': Made(bag={'seed': 5}, with_='sound'),
     'degrees': Made(one_joint(GAIN), {'tracker_unit': np.pi / 180.0}),
@@ -77,16 +76,23 @@ class Corpus:
         self._may_explain, one = True, CORPUS[name]
         try:
             sources = [
-                Sources(self._bag(n), described(one.rig), quick=True, **dict(one.sources))
+                Sources(
+                    self._bag(n),
+                    described(one.rig),
+                    quick=True,
+                    jobs=1,
+                    same_physics=bool(one.with_),
+                    **dict(one.sources),
+                )
                 for n in (name, one.with_)
                 if n
             ]
-            return many_bags.explained_cases(sources, 1, same_physics=bool(one.with_))[0]
+            return many_bags.explained_cases(sources)[0]
         finally:
             self._may_explain = False
 
     def explain_recording(
-        self, recording: Recording, plant: PlantDescription, **options: Any
+        self, recording: RigRecording, plant: PlantDescription, **options: Any
     ) -> Any:
         """Explain as the engine does, once."""
         jobs, tell = options.pop('jobs', 2), options.pop('progress', None) or (lambda _: None)
@@ -98,15 +104,14 @@ class Corpus:
 
         return self._once(recording.name, [unnamed, plant, options], explain, tell)
 
-    def physics_of_all(self, sources: Any, jobs: int, tell: Callable[[str], None]) -> Any:
+    def physics_of_all(self, sources: Any, tell: Callable[[str], None]) -> Any:
         """Choose effects for several recordings as the engine does, once."""
         key = [
-            (_content(one.bag), one.plant, one.band, one.most_effects, one.without)
-            for one in sources
+            (_content(one.bag), one.plant, one.band, one.effects, one.without) for one in sources
         ]
 
         def explain(tell: Callable[[str], None]) -> Any:
-            return self._physics_of_all(sources, jobs, tell)
+            return self._physics_of_all(sources, tell)
 
         return self._once('several recordings', key, explain, tell)
 

@@ -12,12 +12,13 @@ from endoscope_bringup import cli
 from endoscope_bringup.demo import live_graph
 from endoscope_bringup.demo.live_graph import NODES, LiveGraph
 from endoscope_core.errors import NotPlayedError, RigStoppedError
+from endoscope_core.names import JOINTS
 from endoscope_core.physics import EffectSpec, PlantDescription, save_plant
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import hold, move, sequence
-from endoscope_core.signals.command_file import JOINTS, CommandTable, write_command_file
+from endoscope_core.signals.command_file import CommandTable, write_command_file
 from endoscope_explain.investigation import tracking
-from endoscope_explain.investigation.motions import Motion
+from endoscope_explain.investigation.motions import RigMotion
 from endoscope_explain.investigation.tracking import held_out, tracked
 from endoscope_nodes.client.graph_parameters import read_parameter
 from endoscope_nodes.client.motion_player import MotionPlayer
@@ -45,7 +46,7 @@ def motion(tmp_path):
     angle = np.stack([signal(time)[0], np.zeros_like(time)], axis=1)
     file = tmp_path / 'motion.csv'
     write_command_file(file, time, angle)
-    return Motion('there and back', 'bend_x', '', CommandTable(JOINTS, time, angle)), file
+    return RigMotion('there and back', 'bend_x', '', CommandTable(JOINTS, time, angle)), file
 
 
 def graph(rig=None, plant=None, folder=None):
@@ -95,6 +96,7 @@ def test_a_motion_is_played_in_a_session_of_its_own_and_leaves_everything_as_it_
     assert np.abs(played[:, 1]).max() < 0.05
 
 
+@pytest.mark.nightly
 def test_a_motion_is_played_through_a_plant_that_is_in_force_only_meanwhile(tmp_path):
     motion, csv = held_out(PlantDescription(), shipped_rig()), tmp_path / 'held_out.csv'
     write_command_file(csv, motion.table.time, motion.table.angle)
@@ -181,6 +183,7 @@ def test_without_a_person_to_ask_it_does_not_begin(tmp_path, capsys):
     assert not (tmp_path / 'out').exists()
 
 
+@pytest.mark.nightly
 def test_a_rig_as_described_is_explained_by_one_motion(tmp_path, capfd, monkeypatch):
     monkeypatch.setitem(live_graph.RATE, True, TICK_RATE)
     plant, out = tmp_path / 'plant.yaml', tmp_path / 'out'

@@ -16,10 +16,11 @@ from simulated_graph import SimulatedGraph
 
 from endoscope_bags import open_bag
 from endoscope_core.errors import NotPlayedError, RigStoppedError
+from endoscope_core.names import JOINTS
 from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.signals import hold, move, sequence
-from endoscope_core.signals.command_file import JOINTS, CommandTable, write_command_file
-from endoscope_explain.investigation.motions import Motion
+from endoscope_core.signals.command_file import CommandTable, write_command_file
+from endoscope_explain.investigation.motions import RigMotion
 from endoscope_nodes.client import motion_player
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import GraphError
@@ -49,7 +50,7 @@ def motion(tmp_path_factory):
     angle = np.stack([signal(ticks)[0], np.zeros_like(ticks)], axis=1)
     file = tmp_path_factory.mktemp('motion') / 'motion.csv'
     write_command_file(file, ticks, angle)
-    return Motion('there and back', 'bend_x', '', CommandTable(JOINTS, ticks, angle)), file
+    return RigMotion('there and back', 'bend_x', '', CommandTable(JOINTS, ticks, angle)), file
 
 
 @pytest.fixture
@@ -124,6 +125,7 @@ def stands_still(graph):
     return before < STILL and now < STILL
 
 
+@pytest.mark.nightly
 def test_a_stranger_who_commands_is_a_fault(graph, motion, tmp_path, strangers):
     def happens():
         sender = Sender(graph, SLAVE_COMMAND)
@@ -139,6 +141,7 @@ def test_a_stranger_who_commands_is_a_fault(graph, motion, tmp_path, strangers):
     assert stands_still(graph)
 
 
+@pytest.mark.nightly
 def test_a_session_that_is_taken_ends_the_motion(graph, motion, tmp_path):
     def happens():
         graph.command('pause')

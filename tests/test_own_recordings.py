@@ -11,10 +11,10 @@ from endoscope_bringup.demo.live_graph import LiveGraph
 from endoscope_core.physics import PlantDescription
 from endoscope_core.rig import shipped_rig
 from endoscope_explain.audit import audit_recording
+from endoscope_explain.case import Sources
 from endoscope_explain.explanation import Verdict
 from endoscope_explain.many_bags import explained_case
 from endoscope_explain.observe.predicted_signals import view
-from endoscope_explain.pipeline import Sources
 from endoscope_explain.recording import SETPOINT, recording_from_bag
 from endoscope_nodes.runtime.private_domain import private_domain
 
@@ -28,7 +28,7 @@ def recorded(tmp_path_factory):
     """Motions that end before their end, a pause in one, rests, and the slave disabled once."""
     bag = tmp_path_factory.mktemp('own') / 'bag'
     overrides = {'motor_driver': {'seed': 3}}
-    with LiveGraph(bag, private_domain(), lock_step=True, overrides=overrides) as graph:
+    with LiveGraph(bag, private_domain(), lock_step=True, overrides=overrides, rate=250) as graph:
         graph.client.ask('enable')
         graph.set('master', source='motion', motion='periodic')
         graph.advance(4.3)
@@ -51,7 +51,9 @@ def recorded(tmp_path_factory):
     return bag
 
 
-@pytest.fixture(scope='module', params=[(0.0, None), (2.1, None)])
+@pytest.fixture(
+    scope='module', params=[(0.0, None), pytest.param((2.1, None), marks=pytest.mark.nightly)]
+)
 def stretch(request, recorded, tmp_path_factory):
     out = tmp_path_factory.mktemp('cut') / 'cut'
     cut(recorded, out, *request.param)
@@ -109,7 +111,7 @@ def assert_as_described(bag):
 
 def test_a_motion_cut_out_of_a_session_is_consistent(recorded, tmp_path):
     cut(recorded, tmp_path / 'cut', 5.5, 11.0)
-    case = explained_case(Sources(tmp_path / 'cut', PLANT, quick=True))
+    case = explained_case(Sources(tmp_path / 'cut', PLANT, quick=True, jobs=1))
     assert case.verdict is Verdict.CONSISTENT
     assert case.effects == ()
 

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from endoscope_bags import JointStateSeries, Recording
 from endoscope_core.errors import EndoscopeError
-from endoscope_core.identification import Recording as HysteresisRecording
-from endoscope_core.identification import Servo
+from endoscope_core.identification import HysteresisRecording, Servo
 from endoscope_nodes.names import (
     MOTOR_COMMAND,
     MOTOR_MEASURED,

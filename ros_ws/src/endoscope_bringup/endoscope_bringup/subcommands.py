@@ -9,6 +9,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import fields
 from typing import Any, NoReturn
 
 from endoscope_core.errors import nearest, printable
@@ -98,6 +99,21 @@ def within[T: (int, float)](low: T, high: T, kind: type[T]) -> Callable[[str], T
 COUNT = within(1, 1_000_000, int)
 SECONDS = within(1e-3, 3600.0, float)
 """A time to wait."""
+
+
+def add_options(parser: argparse.ArgumentParser, options: Any, *names: str) -> None:
+    """Add an option for fields of a dataclass, all or some, as their metadata describe them."""
+    for each in fields(options):
+        how = {'default': each.default, **each.metadata}
+        if ends := how.pop('ends', None):
+            low, high = ends
+            how['type'] = within(low, high, type(low))
+        if each.default is False:
+            how = {'help': how['help'], 'action': 'store_true'}
+        if each.default == ():
+            how['default'] = []
+        if not names or each.name in names:
+            parser.add_argument(f'--{each.name.replace("_", "-")}', **how)
 
 
 def add_graph_options(

@@ -10,8 +10,8 @@ from chromium import LARGEST_PAGE, drawn
 
 from endoscope_bringup.demo import sentences
 from endoscope_bringup.demo.analysis import Angles, run_of, start_of_motion
-from endoscope_bringup.demo.page import endoscope_picture, report_page
-from endoscope_bringup.demo.procedure import MOTIONS, TUBES, CalibrationFacts, Method, Segment
+from endoscope_bringup.demo.procedure import MOTIONS, TUBES, CalibrationFacts, Method, RecordedRun
+from endoscope_bringup.demo.report_page import endoscope_picture, report_page
 from endoscope_bringup.demo.results import (
     CalibrationOutcome,
     DemoResults,
@@ -137,7 +137,7 @@ def test_a_run_is_compared_with_what_was_asked_for_in_that_run():
         asked[early] = 0.3 * (way - asked_time[early, None])
         stamps = asked_time[::25]
         angles = Angles(100.0 + stamps, asked[::25] + 0.01, 100.0 + asked_time, asked)
-        made = run_of(angles, Segment('t', 'periodic', Method.NONE, 100.0, 116.0))
+        made = run_of(angles, RecordedRun('t', 'periodic', Method.NONE, 100.0, 116.0))
         assert made.desired_deg[:, 0] == pytest.approx(60.0 * np.sin(made.time), abs=0.1)
         assert made.rmse_deg == pytest.approx(np.degrees(0.01))
 
@@ -155,7 +155,7 @@ def test_a_run_that_ended_before_its_motion_did_is_refused():
     asked = signal.sample(time - 2.5)[0]
     angles = Angles(time[::25], asked[::25], time, asked)
     with pytest.raises(ValueError, match='descending colon, periodic, uncompensated'):
-        run_of(angles, Segment('descending colon', 'periodic', Method.NONE, 0.0, 15.0))
+        run_of(angles, RecordedRun('descending colon', 'periodic', Method.NONE, 0.0, 15.0))
 
 
 def test_the_documentation_shows_the_drawing_that_the_page_has():

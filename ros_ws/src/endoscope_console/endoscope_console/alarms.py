@@ -7,7 +7,7 @@ from enum import StrEnum
 from endoscope_core.errors import EndoscopeError
 
 
-class Level(StrEnum):
+class Urgency(StrEnum):
     """How urgent an alarm is, by the priorities of IEC 60601-1-8; conformity is not claimed."""
 
     HIGH = 'high'
@@ -20,7 +20,7 @@ class Alarm:
     """A condition that needs attention."""
 
     id: str  # by which it is acknowledged
-    level: Level
+    level: Urgency
     text: str
     latched: bool = False  # stays until it was acknowledged
 
@@ -42,7 +42,7 @@ class Alarms:
                 self._kept[name] = alarm
         self._present = dict(present)
         shown = self._kept | {n: a for n, a in present.items() if not a.latched}
-        order = list(Level)
+        order = list(Urgency)
         return tuple(sorted(shown.values(), key=lambda a: (order.index(a.level), a.id)))
 
     def acknowledge(self, name: str) -> None:

@@ -14,7 +14,7 @@ _NICE = 10
 _ENDED_S = 5.0
 
 
-class Background:
+class BackgroundCommand:
     """Runs a command in a process group of its own, and ends that with all that it started."""
 
     def __init__(self) -> None:

@@ -13,7 +13,7 @@ import yaml
 from endoscope_bags.errors import BagError
 from endoscope_bags.metadata import bag_files
 from endoscope_console.access import REPORTS
-from endoscope_console.background import Background
+from endoscope_console.background import BackgroundCommand
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import PlantDescription
 from endoscope_core.physics.plant_file import save_plant
@@ -33,7 +33,7 @@ PLANT_FILE = 'plant.yaml'
 
 
 @dataclass
-class Explanation:
+class ShownExplanation:
     """One recording being explained, or explained."""
 
     id: str  # by which a page refers to it
@@ -78,9 +78,9 @@ class Explanation:
 class Explanations:
     """Recordings of one folder, and what explains them."""
 
-    def __init__(self, folder: Path, background: Background) -> None:
+    def __init__(self, folder: Path, background: BackgroundCommand) -> None:
         self._folder, self._background = folder, background
-        self._all: dict[str, Explanation] = {}
+        self._all: dict[str, ShownExplanation] = {}
         # Those that are there can be read again.
         found = sorted(folder.glob(f'*/{_RESULT_FILE}'), key=lambda file: file.stat().st_mtime)
         for file in found:
@@ -175,12 +175,12 @@ class Explanations:
             raise EndoscopeError(f'name a plant: {why}')
         return file
 
-    def _new(self, bag: str, folder: Path) -> Explanation:
-        one = Explanation(f'e{len(self._all) + 1}', bag, folder, secrets.token_urlsafe(16))
+    def _new(self, bag: str, folder: Path) -> ShownExplanation:
+        one = ShownExplanation(f'e{len(self._all) + 1}', bag, folder, secrets.token_urlsafe(16))
         self._all[one.id] = one
         return one
 
-    async def _explain(self, one: Explanation, words: list[str]) -> None:
+    async def _explain(self, one: ShownExplanation, words: list[str]) -> None:
         output: list[str] = []
         done = 0
 

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any, Protocol
 
 from endoscope_console.beat import Beat
-from endoscope_console.graph_side import PATIENCE_S, GraphSide, Settings
+from endoscope_console.graph_side import ANSWER_S, GraphSide, Settings
 from endoscope_core.choices import FOLLOW_THE_HANDLE, PLAYS
 from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.client.graph_listener import GraphError
@@ -77,11 +77,11 @@ class HandlePlace:
     def read_master(self, *names: str) -> dict[str, Any]:
         """Values of the master's parameters."""
         client = self._graph.client
-        return {n: read_parameter(client, f'{MASTER_NODE}.{n}', PATIENCE_S).value for n in names}
+        return {n: read_parameter(client, f'{MASTER_NODE}.{n}', ANSWER_S).value for n in names}
 
     def set_master(self, **values: Any) -> None:
         """Set parameters of the master."""
-        set_parameters(self._graph.client, MASTER_NODE, values, PATIENCE_S)
+        set_parameters(self._graph.client, MASTER_NODE, values, ANSWER_S)
 
     async def give_back(self) -> None:
         """Leave the handle to others, and the master as it was found."""
@@ -99,6 +99,6 @@ class HandlePlace:
     async def _set_source_back(self, source: str) -> None:
         """Have the master follow what it did before, which begins no motion by itself."""
         if source in PLAYS and self._graph.client.state == 'ENABLED':
-            await self._ask(partial(self._graph.client.ask, 'pause', PATIENCE_S))
+            await self._ask(partial(self._graph.client.ask, 'pause', ANSWER_S))
         if source != FOLLOW_THE_HANDLE:
             await self._ask(partial(self.set_master, source=source))

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from endoscope_console.access import REPORTS
-from endoscope_console.background import Background
+from endoscope_console.background import BackgroundCommand
 from endoscope_console.explanations import PLANT_FILE, REPORT_FILE, Explanations
 from endoscope_core.errors import EndoscopeError, NotPlayedError, RigStoppedError
 from endoscope_core.investigation_folder import LOG, PAGE
@@ -62,7 +62,7 @@ class Question:
 
 
 @dataclass
-class Investigation:
+class ShownInvestigation:
     """One investigation, under way or ended."""
 
     id: str  # by which a page refers to it
@@ -109,9 +109,11 @@ class Investigation:
 class Investigations:
     """Those of one folder, of which one at a time is under way."""
 
-    def __init__(self, folder: Path, explanations: Explanations, background: Background) -> None:
+    def __init__(
+        self, folder: Path, explanations: Explanations, background: BackgroundCommand
+    ) -> None:
         self._folder, self._explanations, self._background = folder, explanations, background
-        self._all: dict[str, Investigation] = {}
+        self._all: dict[str, ShownInvestigation] = {}
         self._asking: asyncio.Task[None] | None = None
         self._questions = 0
         # Those that are there can be read again, and continued.
@@ -129,8 +131,8 @@ class Investigations:
                 return one.folder / PAGE
         return None
 
-    def _new(self, folder: Path) -> Investigation:
-        one = Investigation(f'i{len(self._all) + 1}', folder, secrets.token_urlsafe(16))
+    def _new(self, folder: Path) -> ShownInvestigation:
+        one = ShownInvestigation(f'i{len(self._all) + 1}', folder, secrets.token_urlsafe(16))
         self._all[one.id] = one
         return one
 
@@ -152,7 +154,7 @@ class Investigations:
         return self._start(one, Path(plant), rig, experiments, play)
 
     def _start(
-        self, one: Investigation, plant: Path, rig: str, experiments: int, play: Play
+        self, one: ShownInvestigation, plant: Path, rig: str, experiments: int, play: Play
     ) -> str:
         one.running, one.goes_on, one.sentences = True, False, []
         words = ['investigate', '--lines', '--plant', str(plant), '--out', str(one.folder)]
@@ -161,7 +163,7 @@ class Investigations:
         self._background.start('the rig is being investigated', self._follow(one, words, play))
         return one.id
 
-    async def _follow(self, one: Investigation, words: list[str], play: Play) -> None:
+    async def _follow(self, one: ShownInvestigation, words: list[str], play: Play) -> None:
         def take(line: str) -> None:
             message = json.loads(line)
             if 'say' in message:
@@ -184,7 +186,7 @@ class Investigations:
         await self.close()
         one.look()
 
-    async def _ask(self, one: Investigation, motion: AskedMotion, play: Play) -> None:
+    async def _ask(self, one: ShownInvestigation, motion: AskedMotion, play: Play) -> None:
         """Have a motion played, and write its outcome to the command."""
 
         async def consent(words: str) -> bool:
@@ -210,7 +212,7 @@ class Investigations:
             one.plays, self._asking = False, None
             self._background.answer(json.dumps({'became': became, 'why': why}))
 
-    def _answer(self, one: Investigation, go: bool) -> None:
+    def _answer(self, one: ShownInvestigation, go: bool) -> None:
         if one.question is not None and not one.question.answer.done():
             one.question.answer.set_result(go)
 

@@ -12,7 +12,7 @@ from endoscope_console.alarms import Alarms
 from endoscope_console.clients import Client
 from endoscope_console.controls import Controls
 from endoscope_console.explanations import Explanations
-from endoscope_console.graph_side import PATIENCE_S, Settings, identified
+from endoscope_console.graph_side import ANSWER_S, Settings, identified
 from endoscope_console.investigations import AskedMotion, Investigations
 from endoscope_console.investigations import Consent as AskOperator
 from endoscope_console.playing import Holder
@@ -32,7 +32,7 @@ _NO_LEASE = (
     orders.Cancel,
     orders.Acknowledge,
 )
-_WHERE_NOBODY_OPERATES = (orders.Record, orders.Mark, orders.Stop)
+_WHERE_NOBODY_OPERATES = (orders.Record, orders.Mark, orders.StopInvestigation)
 _NOT_MEANWHILE = (orders.Set, orders.Record, orders.Adopt)
 """While a motion of an investigation is recorded as it is commanded."""
 
@@ -79,7 +79,7 @@ class Operations:
         if isinstance(order, _NO_LEASE) or client.id == self.controls.lease.holder:
             return
         # Ending motion is never wrong, whoever has the controls.
-        if isinstance(order, orders.State) and order.command in orders.HALTS:
+        if isinstance(order, orders.StateOrder) and order.command in orders.HALTS:
             return
         holder = self.controls.operator
         if isinstance(order, _WHERE_NOBODY_OPERATES) and not self.controls.lease.holder:
@@ -93,7 +93,7 @@ class Operations:
                 return await self.controls.claim(client, order.take)
             case orders.Release():
                 return self.controls.release(client)
-            case orders.State():
+            case orders.StateOrder():
                 return await self._state(order.command)
             case orders.Calibrate():
                 return await self.controls.moving(
@@ -103,9 +103,9 @@ class Operations:
                 return await self._set(order)
             case orders.Record():
                 service = RECORDER_START if order.on else RECORDER_STOP
-                return await self._ask(partial(self._graph.client.trigger, service, PATIENCE_S))
+                return await self._ask(partial(self._graph.client.trigger, service, ANSWER_S))
             case orders.Mark():
-                bag = await self._ask(partial(self._graph.client.mark, order.reason, PATIENCE_S))
+                bag = await self._ask(partial(self._graph.client.mark, order.reason, ANSWER_S))
                 return f'kept as {Path(bag).name}'
             case orders.Acknowledge():
                 self.alarms.acknowledge(order.alarm)
@@ -120,7 +120,7 @@ class Operations:
                 )
             case orders.Cancel():
                 return await self.explanations.cancel(order.explanation)
-            case orders.Play():
+            case orders.PlayExperiment():
                 return await self._play(client, order.explanation)
             case orders.Adopt():
                 return await self._adopt(order.plant)
@@ -132,7 +132,7 @@ class Operations:
                 # Another hand is no hand for it.
                 self._consented = client
                 return self.investigations.answer(order.question, order.go)
-            case orders.Stop():
+            case orders.StopInvestigation():
                 return await self.investigations.stop(order.investigation, self._halt)
 
     async def _state(self, command: str) -> str:
@@ -141,20 +141,20 @@ class Operations:
             # At once: no thread has to be free for it, and what was asked for before is over.
             self.controls.count_halt(f'a person asked for {command}')
             graph.order(command)
-            return await self._ask(partial(graph.ask, command, PATIENCE_S))
+            return await self._ask(partial(graph.ask, command, ANSWER_S))
         if self.controls.playing.prepares:
             raise EndoscopeError('the motion is being prepared: in a moment')
         withdrawn = self.controls.withdrawn()
         if command == 'home':
-            return await self.controls.moving(command, partial(graph.home, PATIENCE_S, withdrawn))
-        return await self._ask(partial(graph.ask_and_see, command, PATIENCE_S, withdrawn))
+            return await self.controls.moving(command, partial(graph.home, ANSWER_S, withdrawn))
+        return await self._ask(partial(graph.ask_and_see, command, ANSWER_S, withdrawn))
 
     def _calibrate(self, withdrawn: Callable[[], str]) -> str:
         if withdrawn():
             raise EndoscopeError('calibration was withdrawn before it began')
         client = self._graph.client
         first = client.calibration is None or client.calibration.level != 0
-        found = client.calibrate(patience_s=PATIENCE_S)
+        found = client.calibrate(patience_s=ANSWER_S)
         wanted = '' if client.compensator is None else client.compensator.values.get('wanted_mode')
         # What somebody has chosen stays; and nothing changes under a hand, or after a halt.
         at_rest = not withdrawn() and self.controls.beat.report.state is not DeadManState.ENGAGED
@@ -177,7 +177,7 @@ class Operations:
         """Put a plant into force, or the one before; returns the outcome."""
         self.controls.require_rest()
         text = '' if plant is None else plant_text(self.explanations.plant_file(plant))
-        adopt = partial(self._graph.plants.adopt, text, PATIENCE_S)
+        adopt = partial(self._graph.plants.adopt, text, ANSWER_S)
         return (await self._ask(adopt)).answer
 
     async def _investigate(self, order: orders.Investigate) -> Mapping[str, Any]:

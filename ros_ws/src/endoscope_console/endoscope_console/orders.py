@@ -40,7 +40,7 @@ class Release(_Order, tag='release', frozen=True):
     """Give the controls back."""
 
 
-class State(_Order, tag='state', frozen=True):
+class StateOrder(_Order, tag='state', frozen=True):
     """Ask the supervisor for another operating state, or for the way home."""
 
     command: Literal['enable', 'disable', 'pause', 'resume', 'home']
@@ -98,7 +98,7 @@ class Cancel(_Order, tag='cancel', frozen=True):
     explanation: _Name
 
 
-class Play(_Order, tag='play', frozen=True):
+class PlayExperiment(_Order, tag='play', frozen=True):
     """Play the next experiment of an explanation."""
 
     explanation: _Name
@@ -125,7 +125,7 @@ class Consent(_Order, tag='consent', frozen=True):
     go: bool
 
 
-class Stop(_Order, tag='stop', frozen=True):
+class StopInvestigation(_Order, tag='stop', frozen=True):
     """End an investigation, and pause what it moves."""
 
     investigation: _Name
@@ -134,7 +134,7 @@ class Stop(_Order, tag='stop', frozen=True):
 Order = (
     Claim
     | Release
-    | State
+    | StateOrder
     | Calibrate
     | Set
     | Record
@@ -143,11 +143,11 @@ Order = (
     | Bags
     | Explain
     | Cancel
-    | Play
+    | PlayExperiment
     | Adopt
     | Investigate
     | Consent
-    | Stop
+    | StopInvestigation
 )
 """Any of them."""
 

@@ -23,7 +23,7 @@ from endoscope_console.clients import HELLO_S, ORDERS_AT_ONCE, Client, Clients, 
 from endoscope_console.explanations import REPORT_FILE
 from endoscope_console.graph_side import GraphSide
 from endoscope_console.operations import Operations
-from endoscope_console.orders import HALTS, MalformedOrderError, State, read_hello, read_order
+from endoscope_console.orders import HALTS, MalformedOrderError, StateOrder, read_hello, read_order
 from endoscope_console.pictures import SIGNALS
 from endoscope_console.teleop.frames import POINTS, VERSION, MalformedFrameError, decode_input
 from endoscope_console.teleop.operator import Reason
@@ -204,7 +204,7 @@ class Console:
             self.operations.controls.closed(client)
 
     async def _obey(self, socket: WebSocket, client: Client, order: Any) -> None:
-        halts = isinstance(order, State) and order.command in HALTS
+        halts = isinstance(order, StateOrder) and order.command in HALTS
         if client.orders >= ORDERS_AT_ONCE and not halts:
             why = f'{ORDERS_AT_ONCE} orders are not done yet'
             answer: dict[str, Any] = {'op': 'answer', 'id': order.id, 'ok': False, 'why': why}

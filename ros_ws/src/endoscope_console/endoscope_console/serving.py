@@ -22,7 +22,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 
 from endoscope_console.access import Admission, Tokens
 from endoscope_console.alarms import Alarms
-from endoscope_console.background import Background
+from endoscope_console.background import BackgroundCommand
 from endoscope_console.beat import Beat
 from endoscope_console.clients import OF_A_KIND, UNANSWERED, Clients
 from endoscope_console.controls import Controls
@@ -145,7 +145,7 @@ async def _serve(
 ) -> None:
     counts: Counter[str] = Counter()
     clients = Clients(counts)
-    background = Background()
+    background = BackgroundCommand()
     explanations = Explanations(args.bags, background)
     investigations = Investigations(args.bags, explanations, background)
     limits = (rig.joints.hand_speed,) * len(JOINTS)

@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from endoscope_console.alarms import Alarm, Level
+from endoscope_console.alarms import Alarm, Urgency
 from endoscope_console.command import SLOWEST_HZ
 from endoscope_console.graph_side import GraphSide, is_calibrated
 from endoscope_console.operations import Operations
@@ -187,7 +187,7 @@ class View:
             # All else follows from it.
             why = f'the graph has ended with status {self._graph.ended}'
             how = 'restart: Ctrl-C in the terminal, then `endoscope console`'
-            return [Alarm('graph', Level.HIGH, f'{why}; {how}')]
+            return [Alarm('graph', Urgency.HIGH, f'{why}; {how}')]
         client, operations = self._client, self._operations
         age_s = self._state_age_s(now_ns)
         enabled = client.state == 'ENABLED'
@@ -201,48 +201,48 @@ class View:
         found = [
             (
                 client.state == 'FAULT',
-                Alarm('fault', Level.HIGH, client.why or 'the slave is in FAULT', latched=True),
+                Alarm('fault', Urgency.HIGH, client.why or 'the slave is in FAULT', latched=True),
             ),
             (
                 operations.controls.attendance.lacks,
-                Alarm('unattended', Level.HIGH, _UNATTENDED, latched=True),
+                Alarm('unattended', Urgency.HIGH, _UNATTENDED, latched=True),
             ),
-            (silent and enabled, Alarm('supervisor', Level.HIGH, 'the supervisor is silent')),
-            (silent and not enabled, Alarm('graph', Level.LOW, 'no supervisor is heard')),
+            (silent and enabled, Alarm('supervisor', Urgency.HIGH, 'the supervisor is silent')),
+            (silent and not enabled, Alarm('graph', Urgency.LOW, 'no supervisor is heard')),
             (
                 self._graph.pictures.tracked_age_s > _LOST_S and not silent,
-                Alarm('tracker', Level.MEDIUM, 'the tracker is silent'),
+                Alarm('tracker', Urgency.MEDIUM, 'the tracker is silent'),
             ),
             (
                 reason in _OF_A_BUSY_MACHINE,
-                Alarm('dead_man', Level.MEDIUM, f'the dead-man was released: {reason}'),
+                Alarm('dead_man', Urgency.MEDIUM, f'the dead-man was released: {reason}'),
             ),
             (
                 not is_calibrated(client.calibration) and not silent,
-                Alarm('calibration', Level.LOW, 'not calibrated'),
+                Alarm('calibration', Urgency.LOW, 'not calibrated'),
             ),
             (
                 compensator is not None and compensator.values.get('mode') == 'none',
-                Alarm('compensator', Level.LOW, 'nothing is compensated'),
+                Alarm('compensator', Urgency.LOW, 'nothing is compensated'),
             ),
         ]
         if watch is not None and _LEVELS[_level(watch)] == 'warning':
-            found.append((True, Alarm('watch', Level.MEDIUM, watch.message)))
+            found.append((True, Alarm('watch', Urgency.MEDIUM, watch.message)))
         elif watch is not None and watch.message.startswith(LEARNING):
-            found.append((True, Alarm('watch', Level.LOW, f'the watch is {watch.message}')))
+            found.append((True, Alarm('watch', Urgency.LOW, f'the watch is {watch.message}')))
         if tension is not None and tension[0] > _TENSE * self._rig.tension.ceiling:
             text = f'{tension[1]} is above {_TENSE * self._rig.tension.ceiling:.0f} N'
-            found.append((True, Alarm('tension', Level.HIGH, text)))
+            found.append((True, Alarm('tension', Urgency.HIGH, text)))
         load, cores = os.getloadavg()[0], len(os.sched_getaffinity(0))
         slow = factor is not None and factor < _SLOW
         if slow or (reason in _OF_A_BUSY_MACHINE and load > cores):
             text = busy(load, cores, factor if slow else None, self._rate)
-            found.append((True, Alarm('busy', Level.MEDIUM, text)))
+            found.append((True, Alarm('busy', Urgency.MEDIUM, text)))
         refused = self._refused()
         if refused and enabled:
-            found.append((True, Alarm('refused', Level.MEDIUM, refused)))
+            found.append((True, Alarm('refused', Urgency.MEDIUM, refused)))
         if recorder is not None and recorder.level:
-            found.append((True, Alarm('recorder', Level.MEDIUM, recorder.message)))
+            found.append((True, Alarm('recorder', Urgency.MEDIUM, recorder.message)))
         return [alarm for is_so, alarm in found if is_so]
 
 

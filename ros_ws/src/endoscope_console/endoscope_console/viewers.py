@@ -18,7 +18,7 @@ from endoscope_nodes.runtime.environment import joined_node
 from endoscope_nodes.runtime.qos import profile
 from endoscope_nodes.runtime.recorded_topics import message_class
 from endoscope_nodes.runtime.streams import RawSubscription
-from endoscope_nodes.topics import TOPICS, Qos, Topic
+from endoscope_nodes.topics import TOPICS, GraphTopic, Qos
 
 try:
     import foxglove
@@ -42,7 +42,7 @@ _EVENTS = Qos(100)
 class ViewedTopic:
     """A topic that viewers can see, and that is heard while one of them does."""
 
-    def __init__(self, node: Node, topic: Topic, context: Context) -> None:
+    def __init__(self, node: Node, topic: GraphTopic, context: Context) -> None:
         self._node = node
         self._topic = topic
         self._subscription: RawSubscription | None = None

@@ -2,15 +2,15 @@
 
 import pytest
 
-from endoscope_console.alarms import Alarm, Alarms, Level
+from endoscope_console.alarms import Alarm, Alarms, Urgency
 from endoscope_console.graph_side import is_calibrated
 from endoscope_console.view import result
 from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.client.graph_listener import Health
 
-FAULT = Alarm('fault', Level.HIGH, 'a wire is over its ceiling', latched=True)
-TRACKER = Alarm('tracker', Level.MEDIUM, 'the tracker is silent')
-LOW = Alarm('a', Level.LOW, 'not calibrated')
+FAULT = Alarm('fault', Urgency.HIGH, 'a wire is over its ceiling', latched=True)
+TRACKER = Alarm('tracker', Urgency.MEDIUM, 'the tracker is silent')
+LOW = Alarm('a', Urgency.LOW, 'not calibrated')
 
 
 def of(*alarms):

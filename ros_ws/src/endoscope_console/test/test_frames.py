@@ -10,9 +10,9 @@ from page_frames import decode_telemetry, encode_input
 
 from endoscope_console.teleop.frames import (
     POINTS,
+    InputDevice,
     InputFrame,
     MalformedFrameError,
-    Source,
     decode_input,
     encode_telemetry,
 )
@@ -23,7 +23,7 @@ FRAME = InputFrame(
     visible=True,
     focused=True,
     position_mode=True,
-    source=Source.POINTER,
+    source=InputDevice.POINTER,
     seq=7,
     grip=3,
     seen=1000,
@@ -36,7 +36,7 @@ F32 = st.floats(width=32, allow_nan=False, allow_infinity=False)
 FRAMES = st.builds(
     InputFrame,
     *[st.booleans()] * 5,
-    st.sampled_from([Source.KEYBOARD, Source.POINTER, Source.GAMEPAD]),
+    st.sampled_from([InputDevice.KEYBOARD, InputDevice.POINTER, InputDevice.GAMEPAD]),
     *[U32] * 3,
     st.floats(0.0, 1e9),
     F32,

@@ -3,7 +3,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from endoscope_console.teleop.lease import SILENCE_NS, UNATTENDED_NS, Attendance, Lease
+from endoscope_console.teleop.lease import LEASE_SILENCE_NS, UNATTENDED_NS, Attendance, Lease
 
 MS = 1_000_000
 
@@ -73,7 +73,7 @@ class OneOperator(RuleBasedStateMachine):
     @rule(ms=st.sampled_from([1, 500, 999, 1000, 2000]))
     def time_goes_by(self, ms):
         self.now += ms * MS
-        silent = bool(self.holder) and self.now - self.heard >= SILENCE_NS
+        silent = bool(self.holder) and self.now - self.heard >= LEASE_SILENCE_NS
         assert self.lease.turn(self.now) == (self.holder if silent else '')
         if silent:
             self.holder, self.since = '', 0

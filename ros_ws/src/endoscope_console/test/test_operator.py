@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 from page_in_virtual_time import MS, Page
 
-from endoscope_console.teleop.frames import Source
+from endoscope_console.teleop.frames import InputDevice
 from endoscope_console.teleop.operator import Conditions, DeadManState, OperatorDeadMan, Reason
 
 OPEN, READY, ENGAGED = DeadManState
@@ -31,7 +31,7 @@ ENDS = {
     'the hand lets go': (Reason.RELEASED, lambda page: page.send(pressed=False)),
     'another grip': (Reason.RELEASED, lambda page: page.send(grip=page.hand.grip + 1)),
     'an older grip': (Reason.RELEASED, lambda page: page.send(grip=0)),
-    'another source': (Reason.RELEASED, lambda page: page.send(source=Source.POINTER)),
+    'another source': (Reason.RELEASED, lambda page: page.send(source=InputDevice.POINTER)),
     'another mode': (Reason.RELEASED, lambda page: page.send(position_mode=True)),
     'silence': (Reason.SILENT, lambda page: page.turn(100)),
     'a late frame': (Reason.LATE, lambda page: page.send(late_ns=101 * MS)),

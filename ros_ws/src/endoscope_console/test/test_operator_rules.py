@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule, run_state_machine_as_test
 from page_in_virtual_time import MS, Page
 
-from endoscope_console.teleop.frames import Source
+from endoscope_console.teleop.frames import InputDevice
 from endoscope_console.teleop.operator import DeadManState, Reason
 
 OPEN, READY, ENGAGED = DeadManState
@@ -21,7 +21,7 @@ HANDS = st.fixed_dictionaries(
         'visible': st.just(False),
         'focused': st.just(False),
         'position_mode': st.booleans(),
-        'source': st.sampled_from(Source),
+        'source': st.sampled_from(InputDevice),
         'x': st.sampled_from([-1.0, 0.05, 0.3]),
         'y': st.sampled_from([0.0, -0.05, 1.0]),
     },
@@ -92,7 +92,7 @@ class AnOperator(RuleBasedStateMachine):
     def ended_by(self, frame):
         """What of a frame ends the grip that is engaged."""
         now_says = frame.grip, frame.source, frame.position_mode
-        gone = self.of_grip[1] == Source.GAMEPAD != frame.source
+        gone = self.of_grip[1] == InputDevice.GAMEPAD != frame.source
         return {
             reason
             for reason, holds in (
@@ -207,7 +207,7 @@ class AnOperator(RuleBasedStateMachine):
             self.hear(self.page.frame())
             self.turn(20)
 
-    @rule(source=st.sampled_from([Source.KEYBOARD, Source.GAMEPAD]))
+    @rule(source=st.sampled_from([InputDevice.KEYBOARD, InputDevice.GAMEPAD]))
     def the_operator_takes_hold(self, source):
         page = self.page
         page.hand = replace(page.hand, pressed=False, visible=True, focused=True, source=source)

@@ -15,7 +15,7 @@ from endoscope_console.orders import (
     MalformedOrderError,
     Mark,
     Set,
-    State,
+    StateOrder,
     read_hello,
     read_order,
 )
@@ -24,7 +24,7 @@ from endoscope_console.orders import (
 def test_orders_are_read():
     assert read_order('{"op":"claim","id":1}') == Claim(1)
     assert read_order('{"op":"claim","id":2,"take":true}') == Claim(2, take=True)
-    assert read_order('{"op":"state","id":3,"command":"home"}') == State(3, 'home')
+    assert read_order('{"op":"state","id":3,"command":"home"}') == StateOrder(3, 'home')
     assert read_order('{"op":"set","id":4,"scale":0.5}') == Set(4, scale=0.5)
     assert read_order('{"op":"explain","id":5,"bag":"b","plant":null}') == Explain(5, 'b')
     assert read_order('{"op":"mark","id":6}') == Mark(6, reason='')

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from endoscope_core.control import AdoptionError, adopted_plant
+from endoscope_core.names import JOINTS
 from endoscope_core.physics import EffectSpec, PlantDescription
 from endoscope_core.physics.plant_file import plant_as_text
 from endoscope_core.rig import load_rig
 from endoscope_core.safety import AdoptionCode
-from endoscope_core.signals.command_file import JOINTS
 
 RIG = load_rig()
 

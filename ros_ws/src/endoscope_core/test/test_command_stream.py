@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from endoscope_core.compensation.command_stream import Command, CommandStream, Measured, Source
+from endoscope_core.compensation.command_stream import Command, Commander, CommandStream, Measured
 from endoscope_core.compensation.law_in_force import LawInForce, Selection
 from endoscope_core.control import AdoptionError, Feedforward, FeedforwardSettings, MotorLimits
 from endoscope_core.identification.law_choice import CalibrationFindings, LawChoice
@@ -34,11 +34,11 @@ class Slave:
         bending = None if self.shafts is None else tuple(x / GEAR for x in self.shafts)
         return Measured(bending, self.shafts, self.now_ns)
 
-    def command(self, angle, source=Source.MASTER):
+    def command(self, angle, source=Commander.MASTER):
         """Command the first joint; what goes out."""
         self.now_ns += MS
         command = Command(self.now_ns, (angle, 0.0))
-        if source is Source.MASTER:
+        if source is Commander.MASTER:
             out = self.stream.follow(command, self.now_ns, self.measured, self.held)
         else:
             out = self.stream.calibrate(command, self.now_ns, self.measured)
@@ -74,11 +74,11 @@ def test_nothing_moves_without_a_measured_position_or_the_clutch():
 def test_calibration_goes_before_the_master():
     slave = Slave()
     assert slave.command(0.0)
-    assert slave.command(0.0, Source.CALIBRATION)
+    assert slave.command(0.0, Commander.CALIBRATION)
     assert slave.command(0.0) == ()
-    assert slave.stream.source is Source.CALIBRATION
+    assert slave.stream.source is Commander.CALIBRATION
     assert slave.watch(pause_ms=150) == ''
-    assert slave.stream.source is Source.NOBODY
+    assert slave.stream.source is Commander.NOBODY
     assert slave.command(0.0)
 
 
@@ -150,5 +150,5 @@ def test_plants_are_exchanged_only_at_rest():
     slave.shafts = None
     assert refusal() == AdoptionCode.NOT_MEASURED
     slave.shafts = REST
-    slave.command(0.0, Source.CALIBRATION)
+    slave.command(0.0, Commander.CALIBRATION)
     assert refusal() == AdoptionCode.MOVING

@@ -6,7 +6,7 @@ import pytest
 from endoscope_core.errors import FileError, InputError
 from endoscope_core.hysteresis import BoucWenParameters, forward
 from endoscope_core.identification import (
-    Recording,
+    HysteresisRecording,
     Servo,
     fit_model,
     load_class_parameters,
@@ -23,7 +23,7 @@ DRIVER = calibration_sinusoid()(TIME)[0]
 def recording(noise, seed=0, offset=0.0, y0=0.0, rested=True):
     measured = forward(TRUE, DRIVER, y0) + offset
     measured += np.random.default_rng(seed).normal(0.0, noise, TIME.size)
-    return Recording(DRIVER, measured, rested)
+    return HysteresisRecording(DRIVER, measured, rested)
 
 
 def test_it_finds_the_parameters_that_made_a_recording():
@@ -48,7 +48,7 @@ def test_the_search_repeats_with_its_seed():
 
 def test_a_straight_line_has_no_lag_and_stays_in_bounds():
     noise = np.random.default_rng(0).normal(0.0, 0.002, TIME.size)
-    fit = fit_model([Recording(DRIVER, 0.8 * DRIVER + noise)])
+    fit = fit_model([HysteresisRecording(DRIVER, 0.8 * DRIVER + noise)])
     assert fit.parameters.lag < 0.01
     assert fit.parameters.alpha == pytest.approx(0.8, rel=0.01)
 
@@ -68,10 +68,10 @@ def test_the_servo_settles_on_its_command_and_lags_by_its_damping():
     ('recordings', 'complaint'),
     [
         ([], 'no recording'),
-        ([Recording(DRIVER[:50], DRIVER[:50])], 'at least 100'),
-        ([Recording(DRIVER, np.full(TIME.size, np.nan))], 'finite'),
-        ([Recording(DRIVER, np.zeros(TIME.size))], 'less than 1 deg'),
-        ([Recording(DRIVER, DRIVER[:-1])], 'differ in length'),
+        ([HysteresisRecording(DRIVER[:50], DRIVER[:50])], 'at least 100'),
+        ([HysteresisRecording(DRIVER, np.full(TIME.size, np.nan))], 'finite'),
+        ([HysteresisRecording(DRIVER, np.zeros(TIME.size))], 'less than 1 deg'),
+        ([HysteresisRecording(DRIVER, DRIVER[:-1])], 'differ in length'),
     ],
 )
 def test_a_recording_without_hysteresis_is_refused(recordings, complaint):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from endoscope_core.monitoring import Part, RigWatch
-from endoscope_core.monitoring.jump_test import Block, JumpTest
+from endoscope_core.monitoring.jump_test import JumpTest, ResidualBlock
 from endoscope_core.physics import EffectSpec, JointParameters, PlantDescription, simulate
 from endoscope_core.signals.motions import teleoperation_like
 
@@ -134,7 +134,7 @@ def test_a_jump_is_found_where_it_is_and_a_drift_is_not_one():
     def run(offsets):
         test = JumpTest(unit, 0.02 * unit, np.eye(1), np.array([False]), 0.1 * unit, unit, windows)
         return [
-            test.add(Block.of(offset + rng.normal(size=(50, 1)), np.ones((50, 1, 1))))
+            test.add(ResidualBlock.of(offset + rng.normal(size=(50, 1)), np.ones((50, 1, 1))))
             for offset in offsets
         ]
 

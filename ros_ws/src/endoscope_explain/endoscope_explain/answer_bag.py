@@ -20,15 +20,16 @@ from endoscope_bags.rig_kind import RIG_KIND
 from endoscope_bags.topic import LATCHED_QOS
 from endoscope_core.errors import InputError
 from endoscope_core.kinematics import tip_pose
+from endoscope_core.names import JOINTS
 from endoscope_core.physics import PlantDescription, SensorModel
 from endoscope_core.physics.on_stamps import (
     NANOSECONDS,
-    Answer,
     AnswerStamps,
+    RigReadings,
     answer_commands,
 )
 from endoscope_core.physics.packing import recording_faults
-from endoscope_core.physics.plant_file import JOINT_NAMES, plant_as_text
+from endoscope_core.physics.plant_file import plant_as_text
 from endoscope_core.physics.sensing import TOPICS
 from endoscope_core.physics.simulator import TICK
 from endoscope_core.rig import Kind, Rig, RigKind, digest, rig_as_text
@@ -36,7 +37,7 @@ from endoscope_explain.recording import (
     BENDING,
     COMMAND,
     DESIRED,
-    INPUTS,
+    INPUT_TOPICS,
     MOTOR,
     WIRES,
     input_topic,
@@ -65,9 +66,9 @@ def answer_poses(
     """Poses that a tracker which reads these angles (N, J) in rad at these stamps would report."""
     # A pose at another time has no answer, nor has one at which the section would be bent by half a
     # turn or more: a tracker cannot distinguish it from others.
-    angles = np.zeros((len(stamp_ns), len(JOINT_NAMES)))
+    angles = np.zeros((len(stamp_ns), len(JOINTS)))
     for column, joint in enumerate(joints):
-        angles[:, JOINT_NAMES.index(joint)] = bending[:, column]
+        angles[:, JOINTS.index(joint)] = bending[:, column]
     read = dict(zip(stamp_ns.tolist(), angles, strict=True))
     seen = [
         (n, read[stamp])
@@ -113,7 +114,7 @@ class BagCommands:
     @property
     def namespace(self) -> str:
         """Namespace of the topic, with the slash at its end."""
-        return reduce(str.removesuffix, INPUTS, self.topic)
+        return reduce(str.removesuffix, INPUT_TOPICS, self.topic)
 
 
 def commands_of_bag(recording: Recording, plant: PlantDescription, rig: Rig) -> BagCommands:
@@ -202,7 +203,7 @@ def write_answer(
         answer = _answer_as_stamped(driven, commands, stamps, _recorded_shaft(recording, commands))
         if noise_seed is not None:
             answer = _noisy(answer, SensorModel(plant.sensors, noise_seed))
-        streams = [_copied(recording, suffix) for suffix in INPUTS if recording.has(suffix)]
+        streams = [_copied(recording, suffix) for suffix in INPUT_TOPICS if recording.has(suffix)]
         streams += _encoded(answer, times, commands.joints)
         if recording.has(POSE_TOPIC):
             bending_ns = times[BENDING].stamp_ns
@@ -230,13 +231,13 @@ def _answer_as_stamped(
     commands: BagCommands,
     stamps: AnswerStamps,
     recorded: JointStateSeries | None,
-) -> Answer:
+) -> RigReadings:
     """Answer by the recording's own habit of stamping its readings."""
     # A rig that stamps the beginning of its cycle, commands and then reads, records at a stamp what
     # the command of that stamp has already moved. The shafts, whose encoders are the finest clock,
     # show which habit a recording has.
 
-    def answer(read_delay: float, at: AnswerStamps) -> Answer:
+    def answer(read_delay: float, at: AnswerStamps) -> RigReadings:
         return answer_commands(plant, commands.stamp_ns, commands.shaft, at, read_delay=read_delay)
 
     if recorded is None:
@@ -276,8 +277,8 @@ def _kind(plant: PlantDescription, rig: Rig, commands: BagCommands) -> MessageSt
     return MessageStream(commands.namespace + RIG_KIND, STRING, content, commands.stamp_ns[:1])
 
 
-def _noisy(answer: Answer, sensors: SensorModel) -> Answer:
-    return Answer(
+def _noisy(answer: RigReadings, sensors: SensorModel) -> RigReadings:
+    return RigReadings(
         sensors.shaft_position(answer.shaft_position),
         sensors.shaft_velocity(answer.shaft_velocity),
         sensors.shaft_effort(answer.shaft_effort),
@@ -299,7 +300,7 @@ def _copied(recording: Recording, suffix: str) -> MessageStream:
 
 
 def _encoded(
-    answer: Answer, times: dict[str, _Times], joints: tuple[str, ...]
+    answer: RigReadings, times: dict[str, _Times], joints: tuple[str, ...]
 ) -> list[MessageStream]:
     def stream(
         suffix: str,

@@ -12,11 +12,11 @@ from endoscope_explain.case import Ladder
 from endoscope_explain.explanation import Explanation, NamedEffect
 from endoscope_explain.observe.predicted_signals import RecordedView, fits_by, view
 from endoscope_explain.observe.revisits import BLOCK_S
-from endoscope_explain.recording import MOVES_RAD, Recording
+from endoscope_explain.recording import MOVES_RAD, RigRecording
 from endoscope_explain.search.judging import FALSE_ALARMS
 
 
-def confirmed_by(validation: Recording, explanation: Explanation) -> tuple[NamedEffect, ...]:
+def confirmed_by(validation: RigRecording, explanation: Explanation) -> tuple[NamedEffect, ...]:
     """The named effects, doubtful where the second recording is not predicted better with them."""
     # Those of a joint are judged together, by the chance at which any term is taken; what is of a
     # device that joints share, on all joints that show it. A joint that rests is left out.
@@ -77,7 +77,7 @@ def chance_of_no_gain(seen: RecordedView, joints: Collection[str]) -> float:
 PLANTS = ('nominal', 'refitted', 'augmented')
 
 
-def ladders(explanation: Explanation, validation: Recording | None) -> tuple[Ladder, Ladder]:
+def ladders(explanation: Explanation, validation: RigRecording | None) -> tuple[Ladder, Ladder]:
     """Judge all fits, on held-out blocks and on a second recording, if there is one."""
     held_out = {name: dict(explanation.fit.get(name, {})) for name in PLANTS}
     if validation is None or not held_out['nominal']:

@@ -18,10 +18,10 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
+from endoscope_core.names import JOINTS
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.effects import KNOWN
 from endoscope_core.physics.simulator import TICK
-from endoscope_core.signals.command_file import JOINTS
 from endoscope_core.workers import parallel_map
 from endoscope_explain.case import ExplainedCase, NextExperiment
 from endoscope_explain.experiment_motions import SMALLEST, Segment, library
@@ -40,7 +40,7 @@ from endoscope_explain.open_questions import (
     open_questions,
 )
 from endoscope_explain.prediction_set import NOTHING, OTHER_NUMBERS, SOMETHING_ELSE
-from endoscope_explain.recording import Recording
+from endoscope_explain.recording import RigRecording
 
 Array = NDArray[np.float64]
 Played = Collection[tuple[str, str]]
@@ -115,7 +115,7 @@ class _Law:
         model = replace(self.model, base=base, flags=flags, free=free)
         return replace(self, plant=plant, model=model, precision=known)
 
-    def reads(self, imagined: Recording) -> JointObservation:
+    def reads(self, imagined: RigRecording) -> JointObservation:
         """What the joint reads in an imagined motion, with the noise of the recordings."""
         own = observed(imagined, self.plant, self.model.observation.joint)
         noise = self.noise
@@ -133,7 +133,7 @@ class _Law:
         return jacobian(replace(self.model, observation=observation), at)
 
 
-def _law(recording: Recording, plant: PlantDescription, joint: str) -> _Law:
+def _law(recording: RigRecording, plant: PlantDescription, joint: str) -> _Law:
     base, flags, free = free_numbers(plant, joint)
     seen = observed(recording, plant, joint)
     law = _Law(plant, JointModel(seen, base, flags, free), np.empty((0, 0)))
@@ -170,7 +170,7 @@ class BestMotion:
 class LawsOfJoint:
     """Laws that one joint of a rig may have, and what it would read by each in a motion."""
 
-    recording: Recording
+    recording: RigRecording
     laws: Mapping[str, _Law]
 
     @cached_property
@@ -299,14 +299,14 @@ def _rms(apart: Mapping[tuple[str, str], float], answers: Mapping[str, JointObse
     return math.sqrt(2.0 * min(named, default=0.0) / max(o.size for o in answers.values()))
 
 
-def _within(recording: Recording, joint: str) -> tuple[Segment, ...]:
+def _within(recording: RigRecording, joint: str) -> tuple[Segment, ...]:
     """Motions of a joint, each joint as far as it was commanded."""
     most = np.abs(recording.command.values).max(axis=0) / recording.gear
     reaches = tuple(zip(recording.joints, np.round(most, 3).tolist(), strict=True))
     return library(joint, reaches, recording.rig)
 
 
-def _limits(recording: Recording) -> tuple[Array, Array, Array] | None:
+def _limits(recording: RigRecording) -> tuple[Array, Array, Array] | None:
     """What the rig has been through: tensions (J, 2) in N, angles (J,) in rad, least tensions.
 
     None where a joint was never seen.

@@ -25,7 +25,6 @@ from endoscope_explain.decide.conclusions import (
 from endoscope_explain.decide.decision import Decision, decide
 from endoscope_explain.decide.given_physics import GivenJoints, explained_by
 from endoscope_explain.explanation import Explanation, Verdict
-from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.fit.intervals import nominal_estimates
 from endoscope_explain.fit.model import Fit, packed_joint
 from endoscope_explain.fit.nominal import (
@@ -37,8 +36,9 @@ from endoscope_explain.fit.nominal import (
     with_references,
 )
 from endoscope_explain.observe.observation import JointObservation, observe, with_held_noise
-from endoscope_explain.recording import LEAST_DURATION_S, MOVES_RAD, Recording
-from endoscope_explain.search.levels import MOST_EFFECTS, JointSearch, search
+from endoscope_explain.options import BAND, MOST_EFFECTS
+from endoscope_explain.recording import LEAST_DURATION_S, MOVES_RAD, RigRecording
+from endoscope_explain.search.levels import JointSearch, search
 from endoscope_explain.search.other_joint import stands_beside
 from endoscope_explain.search.refit import Candidate
 
@@ -55,10 +55,10 @@ Explained = tuple[JointSearch, Decision]
 
 
 def explain_recording(
-    recording: Recording,
+    recording: RigRecording,
     plant: PlantDescription,
     *,
-    baseline: Recording | None = None,
+    baseline: RigRecording | None = None,
     band: float = BAND,
     most_effects: int = MOST_EFFECTS,
     given: GivenJoints | None = None,
@@ -128,7 +128,7 @@ def explain_recording(
 
 def _healthy(
     observations: tuple[JointObservation, ...],
-    baseline: Recording,
+    baseline: RigRecording,
     plant: PlantDescription,
     band: float,
     left_out: tuple[str, ...],

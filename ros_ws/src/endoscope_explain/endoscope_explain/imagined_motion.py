@@ -6,12 +6,14 @@ from numpy.typing import NDArray
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.simulator import TICK, simulate
 from endoscope_core.rig import Rig
-from endoscope_explain.recording import Recording, Series
+from endoscope_explain.recording import RigRecording, Series
 
 Array = NDArray[np.float64]
 
 
-def answer_to(plant: PlantDescription, name: str, time: Array, angle: Array, rig: Rig) -> Recording:
+def answer_to(
+    plant: PlantDescription, name: str, time: Array, angle: Array, rig: Rig
+) -> RigRecording:
     """A plant's noise-free answer to a motion (N, J) in rad at times (N,)."""
     # The tracker at its rate, all else every tick.
     ticks = np.arange(0.0, time[-1], TICK)
@@ -19,7 +21,7 @@ def answer_to(plant: PlantDescription, name: str, time: Array, angle: Array, rig
     shaft = rig.joints.gear * desired
     answer = simulate(plant, shaft)
     slow = slice(None, None, max(1, round(1.0 / (plant.sensors.tracker_rate * TICK))))
-    return Recording(
+    return RigRecording(
         name,
         0.0,
         plant.joint_names(),
@@ -34,7 +36,7 @@ def answer_to(plant: PlantDescription, name: str, time: Array, angle: Array, rig
 
 
 def is_safe(
-    recording: Recording,
+    recording: RigRecording,
     tension_limit: float | Array,
     bending_limit: float | Array,
     slack_limit: float | Array = 0.0,

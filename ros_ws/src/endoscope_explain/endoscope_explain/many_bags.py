@@ -11,8 +11,8 @@ from typing import Any
 from endoscope_core.atomic_output import atomic_directory, require_free_directory
 from endoscope_core.errors import InputError
 from endoscope_core.workers import worker_pool
-from endoscope_explain.case import ExplainedCase
-from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
+from endoscope_explain.case import ExplainedCase, Sources
+from endoscope_explain.pipeline import Progress, explain_case, read_inputs
 from endoscope_explain.report.sentences import terminal_text, verdict_sentence
 from endoscope_explain.report.writing import REPORT_HTML, provenance, write_report
 from endoscope_explain.shared_physics import physics_of_all
@@ -37,9 +37,7 @@ Content = Mapping[str, Any]
 """What a report.json contains."""
 
 
-def explained_case(
-    sources: Sources, jobs: int = 1, progress: Progress | None = None
-) -> ExplainedCase:
+def explained_case(sources: Sources, progress: Progress | None = None) -> ExplainedCase:
     """Explain one bag; BagError if a recording cannot be used."""
     report = progress or (lambda _: None)
     inputs = read_inputs(sources)
@@ -49,25 +47,20 @@ def explained_case(
     def answered(case: ExplainedCase) -> None:
         report(f'found: {verdict_sentence(case)}')
 
-    case = explain_case(inputs, jobs=jobs, progress=progress, answered=answered)
-    made_from = provenance(sources.bag, sources.plant_file, sources.command)
-    return replace(case, provenance=made_from)
+    case = explain_case(inputs, progress=progress, answered=answered)
+    return replace(case, provenance=provenance(sources))
 
 
 def explained_cases(
-    sources: Sequence[Sources],
-    jobs: int = 2,
-    *,
-    same_physics: bool = False,
-    progress: Progress | None = None,
+    sources: Sequence[Sources], progress: Progress | None = None
 ) -> list[ExplainedCase]:
     """Explain bags side by side, of one rig where they have the `same_physics`.
 
     EndoscopeError if a recording cannot be used, or what was asked for does not go together.
     """
-    sources = _prepared(sources, jobs, same_physics, progress)
+    sources = _prepared(sources, progress)
     cases: dict[int, ExplainedCase] = {}
-    for index, case in _as_they_come(sources, jobs, progress):
+    for index, case in _as_they_come(sources, progress):
         cases[index] = case
         if progress is not None and len(sources) > 1:
             progress(f'{len(cases)}/{len(sources)} {case.recording.name}')
@@ -75,13 +68,7 @@ def explained_cases(
 
 
 def explain_bags(
-    sources: Sequence[Sources],
-    out: Path,
-    *,
-    jobs: int = 2,
-    same_physics: bool = False,
-    say: Say = print,
-    progress: Progress | None = None,
+    sources: Sequence[Sources], out: Path, *, say: Say = print, progress: Progress | None = None
 ) -> dict[str, Content]:
     """Explain bags and write their reports by the bag's name, all or none; what they contain.
 
@@ -90,12 +77,12 @@ def explain_bags(
     Nothing is written where a recording or the folder cannot be used (EndoscopeError).
     """
     require_free_directory(out)
-    sources = _prepared(sources, jobs, same_physics, progress or say)
+    sources = _prepared(sources, progress or say)
     names, alone = unique_names([one.bag for one in sources]), len(sources) == 1
     written: dict[str, Content] = {}
     last = f'Reports: {out}'
     with atomic_directory(out) as folder:
-        for index, case in _as_they_come(sources, jobs, progress):
+        for index, case in _as_they_come(sources, progress):
             name = names[index]
             own = folder if alone else folder / name
             own.mkdir(exist_ok=alone)
@@ -188,14 +175,12 @@ def _largest(fits: Mapping[str, Mapping[str, float]]) -> float | None:
     return max((fit['rmse_over_noise'] for fit in fits.values()), default=None)
 
 
-def _prepared(
-    sources: Sequence[Sources], jobs: int, same_physics: bool, report: Progress | None
-) -> Sequence[Sources]:
+def _prepared(sources: Sequence[Sources], report: Progress | None) -> Sequence[Sources]:
     """Sources of which each can be explained for itself, after all of several were read."""
-    if same_physics:
+    if sources[0].same_physics:
         if any(one.baseline is not None for one in sources):
             raise InputError('same physics and a baseline are mutually exclusive')
-        all_given = physics_of_all(sources, jobs, report or (lambda _: None))
+        all_given = physics_of_all(sources, report or (lambda _: None))
         return [replace(o, given=g) for o, g in zip(sources, all_given, strict=True)]
     if len(sources) > 1:
         for one in sources:
@@ -204,13 +189,15 @@ def _prepared(
 
 
 def _as_they_come(
-    sources: Sequence[Sources], jobs: int, progress: Progress | None
+    sources: Sequence[Sources], progress: Progress | None
 ) -> Iterator[tuple[int, ExplainedCase]]:
     """Explained cases with their places among the sources: several side by side."""
     if len(sources) == 1:
-        yield 0, explained_case(sources[0], jobs, progress)
+        yield 0, explained_case(sources[0], progress)
         return
-    with worker_pool(min(jobs, len(sources))) as pool:
-        futures = {pool.submit(explained_case, one): i for i, one in enumerate(sources)}
+    with worker_pool(min(sources[0].jobs, len(sources))) as pool:
+        futures = {
+            pool.submit(explained_case, replace(one, jobs=1)): i for i, one in enumerate(sources)
+        }
         for future in as_completed(futures):
             yield futures.pop(future), future.result()

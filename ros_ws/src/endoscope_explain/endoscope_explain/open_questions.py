@@ -14,7 +14,6 @@ from endoscope_explain.case import ExplainedCase
 from endoscope_explain.decide.conclusions import spec_of
 from endoscope_explain.explanation import NamedEffect
 from endoscope_explain.fit.free_parameters import (
-    BAND,
     LEAD,
     FreeParameter,
     effect_parameters,
@@ -32,8 +31,9 @@ from endoscope_explain.fit.model import (
 )
 from endoscope_explain.fit.nominal import with_any_numbers
 from endoscope_explain.observe.observation import JointObservation, observe, with_held_noise
+from endoscope_explain.options import BAND
 from endoscope_explain.prediction_set import NOTHING, OTHER_NUMBERS, SOMETHING_ELSE, Contest
-from endoscope_explain.recording import Recording
+from endoscope_explain.recording import RigRecording
 from endoscope_explain.search.screen import background, directions, screened
 from endoscope_explain.search.term import Term, starting_points
 
@@ -128,7 +128,7 @@ def fitted_laws(case: ExplainedCase, question: OpenQuestion) -> dict[str, PlantD
     for name in others:
         if len(laws) == MOST_LAWS:
             break
-        law = _law(bare, observation, name, case.band)
+        law = _law(bare, observation, name, case.inputs.sources.band)
         if law is not None:
             laws[name] = law
     return laws
@@ -147,7 +147,7 @@ def _law(
     return with_fit(bare, observation.joint, fitted)
 
 
-def observed(recording: Recording, plant: PlantDescription, joint: str) -> JointObservation:
+def observed(recording: RigRecording, plant: PlantDescription, joint: str) -> JointObservation:
     """What one joint reads, beside the angle that the plant gives the other one."""
     seen = {each.joint: each for each in with_held_noise(observe(recording, plant))}
     own = seen.pop(joint)

@@ -24,7 +24,7 @@ class Changed(Protocol):
 
 
 @dataclass(frozen=True)
-class Change:
+class OperatorChange:
     """A change of a rig by an amount that is known."""
 
     words: str
@@ -50,8 +50,8 @@ def bent_more(plant: PlantDescription, joint: str) -> PlantDescription:
 
 
 CHANGES = (
-    Change('a weight of 5 g at the horizontal tip, 30 mm from the joint', 2, weighted),
-    Change('a tube bent half as much again', 3, bent_more, 'capstan_exponent'),
+    OperatorChange('a weight of 5 g at the horizontal tip, 30 mm from the joint', 2, weighted),
+    OperatorChange('a tube bent half as much again', 3, bent_more, 'capstan_exponent'),
 )
 
 

@@ -1,31 +1,30 @@
 """From bags to an explained case: read, audit, explain, locate, judge, propose."""
 
 import time
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Collection
+from dataclasses import replace
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
 from endoscope_bags.errors import BagError
 from endoscope_core.physics.description import PlantDescription
-from endoscope_core.rig import Rig
 from endoscope_explain.audit import AuditReport, audit_recording
 from endoscope_explain.case import (
     ChainCut,
     ExplainedCase,
-    Place,
+    Inputs,
+    Mismatch,
+    Sources,
     combined_effects,
     combined_verdict,
     improved_plant,
 )
 from endoscope_explain.compare import confirmed_by, ladders
-from endoscope_explain.decide.given_physics import GivenJoints
 from endoscope_explain.design import propose, what_is_asked
 from endoscope_explain.explain_recording import Progress, explain_recording
 from endoscope_explain.explanation import Explanation, Verdict
 from endoscope_explain.fit.between_rows import with_command_between_rows
-from endoscope_explain.fit.free_parameters import BAND
 from endoscope_explain.fit.nominal import with_isolated_marked
 from endoscope_explain.locate.locating import (
     cut_at_motor,
@@ -35,57 +34,18 @@ from endoscope_explain.locate.locating import (
     locate_unknown,
 )
 from endoscope_explain.recording import (
-    Recording,
+    RigRecording,
     recording_from_bag,
     with_unrecorded,
 )
-from endoscope_explain.search.levels import MOST_EFFECTS
 
 Engine = Callable[..., Explanation]
-
-
-@dataclass(frozen=True)
-class Sources:
-    """What one explanation is made from."""
-
-    bag: Path  # the recording to explain
-    plant: PlantDescription  # the simulation that an engineer has
-    baseline: Path | None = None  # a healthy recording of the same rig
-    validate: Path | None = None  # a second recording of the same rig to judge on
-    without: Collection[str] = ()  # topics that may be missing
-    quick: bool = False  # whether to leave out the next experiment
-    band: float = BAND  # relative tolerance of the plant's parameters
-    most_effects: int = MOST_EFFECTS  # largest number of effects on a joint that are looked for
-    given: GivenJoints | None = None  # the physics of each joint, if it is not to be searched
-    # By joint, names that other recordings of the rig gave or left open.
-    known: Mapping[str, Collection[str]] = field(default_factory=dict)
-    namespace: str | None = None  # of the rig's topics, where a bag has several rigs
-    rig: Rig | None = None  # what was recorded, where that is not what the bag names
-    plant_file: Path | None = None  # where the plant was read from
-    command: str = ''  # as it was typed
-
-
-@dataclass(frozen=True)
-class Inputs:
-    """The sources, read and audited."""
-
-    sources: Sources
-    audit: AuditReport
-    # As audited.
-    baseline: Recording | None = None
-    validation: Recording | None = None
-    mistakes_of_others: tuple[str, ...] = ()  # what somebody took wrongly in these two, in words
-
-    @property
-    def plant(self) -> PlantDescription:
-        """Return the plant as described, with the recorded joints only."""
-        return self.sources.plant.of_joints(self.audit.recording.joints)
 
 
 def read_inputs(sources: Sources) -> Inputs:
     """Read and audit all recordings of a case; BagError, with its name, if one cannot be used."""
 
-    def read(path: Path, plant: PlantDescription) -> Recording:
+    def read(path: Path, plant: PlantDescription) -> RigRecording:
         return recording_from_bag(
             path, plant, without=sources.without, namespace=sources.namespace, rig=sources.rig
         )
@@ -94,7 +54,7 @@ def read_inputs(sources: Sources) -> Inputs:
     plant = sources.plant.of_joints(raw.joints)
     mistaken: list[str] = []
 
-    def second(what: str, path: Path | None) -> Recording | None:
+    def second(what: str, path: Path | None) -> RigRecording | None:
         if path is None:
             return None
         other = read(path, plant)
@@ -109,7 +69,7 @@ def read_inputs(sources: Sources) -> Inputs:
     return Inputs(sources, _audited(raw, plant), baseline, validation, tuple(mistaken))
 
 
-def _audited(raw: Recording, plant: PlantDescription) -> AuditReport:
+def _audited(raw: RigRecording, plant: PlantDescription) -> AuditReport:
     report = audit_recording(raw, plant)
     return replace(report, recording=with_command_between_rows(report.recording, plant))
 
@@ -128,7 +88,6 @@ def explain_case(
     inputs: Inputs,
     engine: Engine | None = None,
     *,
-    jobs: int = 2,
     progress: Progress | None = None,
     answered: Callable[[ExplainedCase], None] | None = None,
 ) -> ExplainedCase:
@@ -148,10 +107,10 @@ def explain_case(
             inputs.plant,
             baseline=inputs.baseline,
             band=sources.band,
-            most_effects=sources.most_effects,
+            most_effects=sources.effects,
             given=sources.given,
             known=sources.known,
-            jobs=jobs,
+            jobs=sources.jobs,
             progress=progress,
         )
     plant = improved_plant(explanation, audit)
@@ -160,27 +119,21 @@ def explain_case(
         explanation = replace(explanation, effects=confirmed_by(validation, explanation))
     if explanation.fit:
         report('locating what was found')
-    recording = audit.recording
     case = ExplainedCase(
-        recording=recording,
-        audit=audit,
+        inputs=inputs,
         explanation=explanation,
         verdict=combined_verdict(explanation, audit),
         effects=combined_effects(explanation, audit),
         places=(),
         plant=with_unrecorded(plant, sources.plant),
         ladder={},
-        validation_name='' if validation is None else validation.name,
-        baseline_name='' if inputs.baseline is None else inputs.baseline.name,
-        mistakes_of_others=inputs.mistakes_of_others,
-        band=sources.band,
     )
     case = replace(case, places=_places(case), cuts=_cuts(case))
     if answered is not None:
         answered(case)
     if explanation.fit and not sources.quick:
         report('looking for the motion that decides what is left open')
-        case = replace(case, next_experiment=propose(case, what_is_asked(case), jobs))
+        case = replace(case, next_experiment=propose(case, what_is_asked(case), sources.jobs))
     held_out, second = ladders(explanation, validation)
     return replace(case, ladder=held_out, validation=second, runtime_s=time.monotonic() - begun)
 
@@ -190,7 +143,7 @@ def _cuts(case: ExplainedCase) -> tuple[ChainCut, ...]:
     return cut_at_motor(case.recording, case.explanation.refitted) if fitted else ()
 
 
-def _places(case: ExplainedCase) -> tuple[Place, ...]:
+def _places(case: ExplainedCase) -> tuple[Mismatch, ...]:
     if case.verdict in (Verdict.CONSISTENT, Verdict.INSUFFICIENT_DATA):
         return ()
     explanation = case.explanation

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from endoscope_bags.errors import BagError
 from endoscope_bags.information import counted_losses
 from endoscope_bags.joint_state_series import JointStateSeries
-from endoscope_bags.recording import Recording as Bag
-from endoscope_bags.recording import open_bag, rig_of_bag
+from endoscope_bags.recording import Recording, open_bag, rig_of_bag
 from endoscope_bags.rig_kind import kind_of_bag
 from endoscope_bags.sequence_gaps import SequenceGaps
 from endoscope_core.choices import WAIVABLE
@@ -28,7 +27,7 @@ MOTOR = 'motor/measured_js'
 WIRES = 'wires/measured_js'
 BENDING = 'slave/measured_js'
 DESIRED = 'slave/servo_jp'
-INPUTS = (SETPOINT, COMMAND, DESIRED)
+INPUT_TOPICS = (SETPOINT, COMMAND, DESIRED)
 """The nearest to the shafts first.
 
 A setpoint shows what the motor driver made of commands: which it obeyed, how it bounded them, and
@@ -88,13 +87,13 @@ class Restart:
     """Where another recording of the same rig begins within one that was made of several."""
 
     time: float  # of its first command, s
-    # (J, K), as `Recording.start`, the motors' way since the recording before.
+    # (J, K), as `RigRecording.start`, the motors' way since the recording before.
     way: Array
-    speed: Array  # (J,), as `Recording.start_speed`
+    speed: Array  # (J,), as `RigRecording.start_speed`
 
 
 @dataclass(frozen=True)
-class Recording:
+class RigRecording:
     """What was commanded and measured."""
 
     name: str  # what to call it in messages
@@ -123,7 +122,7 @@ class Recording:
         names = ('shaft_position', 'shaft_velocity', 'shaft_effort', 'tension', 'bending')
         return {name: s for name in names if (s := getattr(self, name)) is not None}
 
-    def with_series(self, changed: Mapping[str, Series]) -> 'Recording':
+    def with_series(self, changed: Mapping[str, Series]) -> 'RigRecording':
         """Return the same recording with some series, by name, replaced."""
         fields: dict[str, Any] = dict(changed)
         return replace(self, **fields)
@@ -140,9 +139,9 @@ class Recording:
         return float(max(last))
 
 
-def input_topic(bag: Bag, namespace: str | None = None) -> str:
+def input_topic(bag: Recording, namespace: str | None = None) -> str:
     """The plant's input, the nearest to the shafts that was recorded; empty where none was."""
-    return next((topic for topic in INPUTS if bag.has(topic, namespace)), '')
+    return next((topic for topic in INPUT_TOPICS if bag.has(topic, namespace)), '')
 
 
 QUANTITY_TOPICS = {
@@ -152,7 +151,7 @@ QUANTITY_TOPICS = {
     'tension': WIRES,
     'bending': BENDING,
 }
-"""Topic of each measured series of a `Recording`."""
+"""Topic of each measured series of a `RigRecording`."""
 
 QUANTITY_UNITS = {
     'shaft_position': 'rad',
@@ -247,7 +246,7 @@ def recording_from_bag(
     without: Collection[str] = (),
     namespace: str | None = None,
     rig: Rig | None = None,
-) -> Recording:
+) -> RigRecording:
     """Read what analysis needs from a bag, in the order in which it was recorded.
 
     It has the joints of the plant that all topics have, and notes of what is missing. Topics of
@@ -335,7 +334,7 @@ def recording_from_bag(
             motor.check_finite([key])
             motors[key] = series(MOTOR, motor, [motor_name(j) for j in joints], key)
     wire_list = [w for j in joints for w in wire_names(j)]
-    return Recording(
+    return RigRecording(
         name=Path(path).name.removesuffix('.mcap'),
         origin=origin_ns * 1e-9,
         joints=tuple(joints),
@@ -361,7 +360,7 @@ def with_unrecorded(plant: PlantDescription, described: PlantDescription) -> Pla
     )
 
 
-def _lacking_message(bag: Bag, topics: Sequence[str], namespace: str | None) -> str:
+def _lacking_message(bag: Recording, topics: Sequence[str], namespace: str | None) -> str:
     text = bag.lacking(*topics, namespace=namespace)
     waivable = [t for t in topics if t in WAIVABLE]
     if waivable and len(waivable) == len(topics):

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
+from endoscope_explain.case import Sources
 from endoscope_explain.decide.decision import found_together
 from endoscope_explain.decide.given_physics import (
     GivenJoints,
@@ -15,13 +16,11 @@ from endoscope_explain.decide.given_physics import (
 from endoscope_explain.fit.nominal import ReferenceFits, with_references
 from endoscope_explain.fit.pooled import judged_alone
 from endoscope_explain.observe.observation import observe, with_held_noise
-from endoscope_explain.pipeline import Sources, read_inputs, refuse_other_joints
+from endoscope_explain.pipeline import read_inputs, refuse_other_joints
 from endoscope_explain.search.levels import search
 
 
-def physics_of_all(
-    sources: Sequence[Sources], jobs: int, report: Callable[[str], None]
-) -> list[GivenJoints]:
+def physics_of_all(sources: Sequence[Sources], report: Callable[[str], None]) -> list[GivenJoints]:
     """Effects that explain all recordings of a rig; BagError if one cannot be used."""
     recordings: list[dict[str, ReferenceFits]] = []
     most_effects, first_bag = 0, Path()
@@ -32,17 +31,17 @@ def physics_of_all(
             if recordings:
                 refuse_other_joints(of.bag, recording.joints, first_bag, recordings[0])
             else:
-                most_effects, first_bag = of.most_effects, of.bag
+                most_effects, first_bag = of.effects, of.bag
             report(f'{recording.name}: refitting the nominal plant')
             _, references = with_references(
                 recording,
                 with_held_noise(observe(recording, one.plant)),
                 one.plant,
                 of.band,
-                jobs,
+                of.jobs,
             )
             recordings.append(dict(zip(recording.joints, references, strict=True)))
-        return shared_effects(recordings, most_effects, jobs, report)
+        return shared_effects(recordings, most_effects, sources[0].jobs, report)
 
 
 def shared_effects(

@@ -12,8 +12,9 @@ from itertools import pairwise
 import numpy as np
 
 from endoscope_explain.audit.finding import AuditReport, Finding
-from endoscope_explain.pipeline import Inputs, refuse_other_joints
-from endoscope_explain.recording import Array, Recording, Restart, Series
+from endoscope_explain.case import Inputs
+from endoscope_explain.pipeline import refuse_other_joints
+from endoscope_explain.recording import Array, Restart, RigRecording, Series
 
 APART_S = 1.0
 """Least rest between two recordings; each begins whole seconds after the first one, so that ticks
@@ -42,7 +43,7 @@ def inputs_joined(inputs: Sequence[Inputs]) -> Inputs:
     return replace(first, audit=AuditReport(recordings_joined(recordings), kept))
 
 
-def recordings_joined(recordings: Sequence[Recording]) -> Recording:
+def recordings_joined(recordings: Sequence[RigRecording]) -> RigRecording:
     """Recordings of the same joints one after the other, with the series that all of them have."""
     first = recordings[0]
     later = _later_by(recordings)
@@ -67,7 +68,7 @@ def recordings_joined(recordings: Sequence[Recording]) -> Recording:
     )
 
 
-def _later_by(recordings: Sequence[Recording]) -> list[float]:
+def _later_by(recordings: Sequence[RigRecording]) -> list[float]:
     """By how much the times of each recording are later, in s, in all of them as one."""
     begin, later = float(recordings[0].command.time[0]), [0.0]
     for before, one in pairwise(recordings):
@@ -87,11 +88,11 @@ def _one_after_another(parts: Sequence[Series], later: Sequence[float]) -> Serie
     )
 
 
-def _way(recording: Recording) -> Array:
+def _way(recording: RigRecording) -> Array:
     return recording.command.values[0][:, None] if recording.start is None else recording.start
 
 
-def _speed(recording: Recording) -> Array:
+def _speed(recording: RigRecording) -> Array:
     if recording.start_speed is None:
         return np.zeros(len(recording.joints))
     return recording.start_speed

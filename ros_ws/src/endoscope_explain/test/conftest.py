@@ -12,6 +12,7 @@ from endoscope_core.physics.sensing import SensorModel
 from endoscope_core.physics.simulator import simulate
 from endoscope_core.rig import shipped_rig
 from endoscope_explain.audit import audit_recording
+from endoscope_explain.case import Inputs, Sources
 from endoscope_explain.explanation import (
     Estimate,
     Explanation,
@@ -21,8 +22,8 @@ from endoscope_explain.explanation import (
     Verdict,
 )
 from endoscope_explain.observe.predicted_signals import fits_by, view
-from endoscope_explain.pipeline import Inputs, Sources, explain_case
-from endoscope_explain.recording import Recording, Series
+from endoscope_explain.pipeline import explain_case
+from endoscope_explain.recording import RigRecording, Series
 
 # Tests import each other's recordings by name.
 sys.path.insert(0, str(Path(__file__).parent))
@@ -42,7 +43,7 @@ def make_recording(
     duration: float = 12.0,
     seed: int = 1,
     command: np.ndarray | None = None,
-) -> Recording:
+) -> RigRecording:
     """Sensors' readings of a plant under a shaft command, or swept, stepped and held."""
     plant = plant or PlantDescription()
     n = int(duration / TICK) if command is None else len(command)
@@ -56,7 +57,7 @@ def make_recording(
     truth = simulate(plant, command)
     sensors = SensorModel(plant.sensors, seed)
     tracker = slice(None, None, TRACKER_EVERY)
-    return Recording(
+    return RigRecording(
         'synthetic',
         0.0,
         joints,

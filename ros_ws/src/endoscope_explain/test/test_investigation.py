@@ -10,26 +10,28 @@ import pytest
 
 from endoscope_core.errors import EndoscopeError, InputError, NotPlayedError, RigStoppedError
 from endoscope_core.investigation_folder import LOG, PAGE, held, is_left_behind
+from endoscope_core.names import JOINTS
 from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
 from endoscope_core.physics.plant_file import load_plant, save_plant
 from endoscope_core.physics.simulator import TICK
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import hold, move, sequence
-from endoscope_core.signals.command_file import JOINTS, CommandTable, read_command_file
+from endoscope_core.signals.command_file import CommandTable, read_command_file
 from endoscope_explain import prediction_set
 from endoscope_explain.audit import audit_recording
+from endoscope_explain.case import Inputs, Sources
 from endoscope_explain.explanation import Verdict
-from endoscope_explain.investigation import page
+from endoscope_explain.investigation import index_page
 from endoscope_explain.investigation.investigation import Investigation, investigate
 from endoscope_explain.investigation.log import LOG_MD, PLANT, Stop, begun
 from endoscope_explain.investigation.motions import (
-    Motion,
     MotionRefusedError,
+    RigMotion,
     commissioning,
     require_allowed,
 )
 from endoscope_explain.observe.revisits import EVERY_S, LEAST_SHARE, seen_before, strokes
-from endoscope_explain.pipeline import Inputs, Sources, explain_case
+from endoscope_explain.pipeline import explain_case
 from endoscope_explain.prediction_set import Contest
 from endoscope_explain.report.visited_once import once_only
 from endoscope_explain.takes import inputs_joined
@@ -72,7 +74,7 @@ class SimulatedRig:
         """Explain the recordings of bags together, as `explain_together` does."""
         inputs = [
             Inputs(
-                Sources(bag, ONE, quick=True, most_effects=1),
+                Sources(bag, ONE, quick=True, effects=1),
                 audit_recording(self.recordings[bag], ONE),
             )
             for bag in bags
@@ -136,8 +138,17 @@ def certain(stribeck_case):
     return dataclasses.replace(stribeck_case, effects=(alone,))
 
 
-def test_no_more_motions_are_asked_for_than_are_wanted(both, stribeck_case):
-    log = investigate(both, no_rig, lambda bags, known: stribeck_case)
+def test_no_more_motions_are_asked_for_than_are_wanted_and_what_was_named_is_known_to_the_next(
+    both, stribeck_case
+):
+    known_then = []
+
+    def explain(bags, known):
+        known_then.append(known)
+        return stribeck_case
+
+    log = investigate(both, no_rig, explain)
+    assert known_then == [{}, {'bend_x': {'stribeck_friction', 'viscous_friction'}}]
     assert log.stopped is Stop.USED_UP
     assert log.rounds[0].motion == 'commissioning'
     assert len(log.rounds) == 2
@@ -145,7 +156,11 @@ def test_no_more_motions_are_asked_for_than_are_wanted(both, stribeck_case):
     times = (both.folder / LOG_MD).read_text().split('## Times')[1]
     assert times.count('explaining') == 2
     assert log.rounds[0].proposed_s > 0.0
-    # More of them continue it.
+
+
+@pytest.mark.nightly
+def test_more_motions_continue_it_and_none_is_asked_for_again(both, stribeck_case):
+    investigate(both, no_rig, lambda bags, known: stribeck_case)
     again = investigate(
         dataclasses.replace(both, experiments=2), no_rig, lambda bags, known: stribeck_case
     )
@@ -183,7 +198,12 @@ def test_a_fault_ends_it_with_what_is_known_and_it_is_continued(both, stribeck_c
     ('error', 'stopped', 'words'),
     [
         (KeyboardInterrupt(), 'interrupted', 'It was interrupted: asked for by Ctrl-C'),
-        (EndoscopeError('timed out'), 'failed', 'It could not go on: timed out.'),
+        pytest.param(
+            EndoscopeError('timed out'),
+            'failed',
+            'It could not go on: timed out.',
+            marks=pytest.mark.nightly,
+        ),
     ],
 )
 def test_what_breaks_off_loses_nothing_and_is_called_what_it_was(
@@ -199,7 +219,7 @@ def test_what_breaks_off_loses_nothing_and_is_called_what_it_was(
             both,
             interrupted,
             lambda bags, known: stribeck_case,
-            page=lambda log: page.page(log, both.folder),
+            page=lambda log: index_page.page(log, both.folder),
         )
     kept = log_of(both.folder)
     assert kept['stopped'] == stopped
@@ -214,23 +234,13 @@ def test_what_breaks_off_loses_nothing_and_is_called_what_it_was(
     assert f'endoscope {version("endoscope_explain")}' in html
 
 
-def test_names_that_were_given_or_left_open_are_known_to_the_next_explanation(both, stribeck_case):
-    known_then = []
-
-    def explain(bags, known):
-        known_then.append(known)
-        return stribeck_case
-
-    investigate(both, no_rig, explain)
-    assert known_then == [{}, {'bend_x': {'stribeck_friction', 'viscous_friction'}}]
-
-
-def test_numbers_that_an_effect_may_stand_for_are_asked_about(both, certain, monkeypatch):
+def test_numbers_that_an_effect_may_stand_for_are_left_open(both, certain, monkeypatch):
     monkeypatch.setattr(prediction_set, 'MASS', 1.0)
     tried = Contest((('other numbers',), ('gravity', 'load_of_angle')), (9.0, 9.0), 5.0, False)
     found = {'effects': (), 'verdict': Verdict.PARAMETERS_DIFFER}
     explanation = dataclasses.replace(certain.explanation, contests={'bend_x': tried}, **found)
     left_open = dataclasses.replace(certain, explanation=explanation, **found)
+    both = dataclasses.replace(both, experiments=0)
     log = investigate(both, no_rig, lambda bags, known: left_open)
     (name,) = log.last_answer.names
     assert (name.id, name.joint, name.rivals) == ('other numbers', 'bend_x', tried.names[1])
@@ -324,6 +334,6 @@ def test_a_rig_that_the_plant_answers_with_too_much_tension_is_not_moved():
 def test_a_motion_that_is_too_fast_is_refused():
     time = np.array([0.0, 1.0, 1.1, 2.0])
     angle = np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0], [1.0, 0.0]])
-    motion = Motion('jump', 'bend_x', '', CommandTable(JOINTS, time, angle))
+    motion = RigMotion('jump', 'bend_x', '', CommandTable(JOINTS, time, angle))
     with pytest.raises(MotionRefusedError, match='speed is 10 rad/s'):
         require_allowed(motion, RIG)

@@ -1,4 +1,5 @@
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -7,7 +8,7 @@ from endoscope_core.physics.description import EffectSpec, JointParameters, Plan
 from endoscope_core.rig import shipped_rig
 from endoscope_explain import design, operator_changes
 from endoscope_explain.audit import audit_recording
-from endoscope_explain.case import ExplainedCase
+from endoscope_explain.case import ExplainedCase, Inputs, Sources
 from endoscope_explain.design import Asking, propose, what_is_asked
 from endoscope_explain.experiment_motions import library
 from endoscope_explain.explanation import Explanation, NamedEffect, Verdict
@@ -15,7 +16,7 @@ from endoscope_explain.imagined_motion import answer_to, is_safe
 from endoscope_explain.observe.observation import commanded
 from endoscope_explain.observe.revisits import Visited
 from endoscope_explain.open_questions import DECIDED, OpenQuestion, fitted_laws, open_questions
-from endoscope_explain.operator_changes import Change, what_would_decide
+from endoscope_explain.operator_changes import OperatorChange, what_would_decide
 from endoscope_explain.prediction_set import OTHER_NUMBERS, SOMETHING_ELSE, Contest
 
 ONE = PlantDescription({'bend_x': JointParameters()})
@@ -53,8 +54,7 @@ def case_of(recording, plant, *names, **changed):
         fit={},
     )
     return ExplainedCase(
-        recording=audit.recording,
-        audit=audit,
+        inputs=Inputs(Sources(Path('rig'), described), audit),
         explanation=explanation,
         verdict=Verdict.MISSING_PHYSICS,
         effects=(effect,),
@@ -163,6 +163,7 @@ def test_the_proposal_names_its_laws_and_lasts_seconds(late_case, asking):
     assert f'{proposed.waveform.capitalize()} of bend_x' in proposed.why
 
 
+@pytest.mark.nightly
 def test_no_motion_decides_more_per_second_than_the_proposed_one(late_case, asking):
     proposed = propose(late_case, [asking])
 
@@ -253,7 +254,7 @@ def test_evidence_is_weighed_by_probabilities_and_read_at_the_temperature():
 
 def test_where_no_motion_decides_an_operator_may(asking, monkeypatch):
     monkeypatch.setattr(
-        operator_changes, 'CHANGES', (Change('nothing', 1, lambda plant, joint: plant),)
+        operator_changes, 'CHANGES', (OperatorChange('nothing', 1, lambda plant, joint: plant),)
     )
     assert what_would_decide([asking]).startswith('Neither nothing would distinguish')
 
@@ -265,7 +266,7 @@ def stiffer(plant, joint):
 
 
 def test_a_change_is_credited_with_what_it_adds_alone(asking, monkeypatch):
-    monkeypatch.setattr(operator_changes, 'CHANGES', (Change('stiffer wires', 4, stiffer),))
+    monkeypatch.setattr(operator_changes, 'CHANGES', (OperatorChange('stiffer wires', 4, stiffer),))
     brought = iter((5.0, 7.0, 5.0, 9.0))
     best = dataclasses.replace(asking.best(1, ()))
     monkeypatch.setattr(Asking, 'best', lambda *_: dataclasses.replace(best, nats=next(brought)))

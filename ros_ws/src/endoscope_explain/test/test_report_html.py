@@ -106,7 +106,9 @@ def test_a_page_says_of_what_kind_of_rig_its_recording_is(page, stribeck_case):
     rig = RigKind(Kind.EMULATED, 'endoscope 9')
     of_emulators = dataclasses.replace(stribeck_case.recording, rig_kind=rig)
     made = Provenance('bags/rig', 'a1' * 32, '', '', '1.2', '', 'today')
-    told = html_page(dataclasses.replace(stribeck_case, recording=of_emulators, provenance=made))
+    audit = dataclasses.replace(stribeck_case.audit, recording=of_emulators)
+    inputs = dataclasses.replace(stribeck_case.inputs, audit=audit)
+    told = html_page(dataclasses.replace(stribeck_case, inputs=inputs, provenance=made))
     assert 'rig emulated (endoscope 9)' in text_of(told)
 
 

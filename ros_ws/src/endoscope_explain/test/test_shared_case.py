@@ -6,9 +6,10 @@ from outside_data import CASES, needs
 
 from endoscope_core.physics import load_plant
 from endoscope_explain.fit.evidence import mean_squares
-from endoscope_explain.fit.free_parameters import BAND, SCATTERED
+from endoscope_explain.fit.free_parameters import SCATTERED
 from endoscope_explain.fit.nominal import with_references
 from endoscope_explain.observe.observation import observe
+from endoscope_explain.options import BAND
 from endoscope_explain.recording import recording_from_bag
 
 FOLDER = CASES / 'sheath'

@@ -201,7 +201,7 @@ class Pace:
 class Composition(ClosedOnExit):
     """Nodes in this process with a context and a domain of their own."""
 
-    _PATIENCE_S = 60.0
+    _WAITING_S = 60.0
     STUCK_S = 120.0
 
     def __init__(
@@ -217,7 +217,7 @@ class Composition(ClosedOnExit):
         self.runtime.prepare()
         self._first = self.runtime.nodes[0]
         self._commands = self._first.create_publisher(String, STATE_COMMAND, EVENT)
-        deadline = time.monotonic() + self._PATIENCE_S
+        deadline = time.monotonic() + self._WAITING_S
         while not self.runtime.connected():
             if time.monotonic() > deadline:
                 raise RuntimeError('the nodes do not find each other')
@@ -234,7 +234,7 @@ class Composition(ClosedOnExit):
 
     def enable(self) -> None:
         machine = self.node('supervisor').machine
-        deadline = time.monotonic() + self._PATIENCE_S
+        deadline = time.monotonic() + self._WAITING_S
         while machine.state is not OperatingState.ENABLED:
             if time.monotonic() > deadline:
                 raise RuntimeError(f'the slave is not enabled: {machine.present_causes}')
@@ -247,7 +247,7 @@ class Composition(ClosedOnExit):
         timer = self._first.create_timer(
             seconds, lambda: future.done() or future.set_result(None), clock=self._steady
         )
-        self.runtime.spin_until(future, seconds + self._PATIENCE_S)
+        self.runtime.spin_until(future, seconds + self._WAITING_S)
         self._first.destroy_timer(timer)
 
     def kept_pace(self, seconds: float) -> Pace:
@@ -279,7 +279,7 @@ class Composition(ClosedOnExit):
 
     def advance(self, seconds: float) -> None:
         future = self.node(CLOCK_NODE).advance(seconds)
-        self.runtime.spin_until(future, 10.0 * seconds + self._PATIENCE_S)
+        self.runtime.spin_until(future, 10.0 * seconds + self._WAITING_S)
 
     def close(self) -> None:
         self.runtime.close()
@@ -287,7 +287,7 @@ class Composition(ClosedOnExit):
 
 CARRIED = 0.99
 _OBEYING = ('compensator', 'motor_driver')
-_PATIENCE_S = 120.0
+_ENABLING_S = 120.0
 
 
 def processes_are_carried(rate: int, seconds: float) -> bool:
@@ -337,7 +337,7 @@ def _hops(done: Counter[str]) -> str:
 
 def _enable(operator: Operator) -> None:
     """Wait until every node publishes and the slave follows commands."""
-    deadline = time.monotonic() + _PATIENCE_S
+    deadline = time.monotonic() + _ENABLING_S
     while operator.graph.state != OperatingState.ENABLED or len(operator.graph.heard_ns) < len(
         NODES
     ):

@@ -20,7 +20,7 @@ from endoscope_core.physics.plant_file import save_plant
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals.command_file import CommandTable, read_command_file
 from endoscope_explain.audit import audit_recording
-from endoscope_explain.case import ExplainedCase
+from endoscope_explain.case import ExplainedCase, Inputs, Sources
 from endoscope_explain.experiment_motions import SAMPLE_S, as_played, library
 from endoscope_explain.explanation import Explanation
 from endoscope_explain.investigation.investigation import (
@@ -30,9 +30,9 @@ from endoscope_explain.investigation.investigation import (
     investigate,
 )
 from endoscope_explain.investigation.log import Stop
-from endoscope_explain.investigation.motions import Motion, commissioning
-from endoscope_explain.pipeline import Inputs, Sources, explain_case
-from endoscope_explain.recording import Recording
+from endoscope_explain.investigation.motions import RigMotion, commissioning
+from endoscope_explain.pipeline import explain_case
+from endoscope_explain.recording import RigRecording
 from endoscope_explain.takes import APART_S, inputs_joined
 from endoscope_lab.bench import keep_row, rows_so_far, side_by_side, table_head, table_row
 from endoscope_lab.concealed.another_rig import Laws
@@ -191,11 +191,11 @@ class SimulatedRig:
         self._case, self._read, self._until = case, read, until
         self._noise = np.random.default_rng([case.seed, 1])
         self._command = np.empty((0, len(case.true.joints)))
-        self._recordings: dict[Path, Recording] = {}
+        self._recordings: dict[Path, RigRecording] = {}
         self._motion_s = self._cpu_s = 0.0
         self.last: _Answer | None = None
 
-    def play(self, motion: Motion, file: Path, bag: Path) -> None:
+    def play(self, motion: RigMotion, file: Path, bag: Path) -> None:
         """Play the motion of a file; the rig stops by itself if a wire is too tight."""
         if time.time() > self._until:
             raise NotPlayedError('its time is over')
@@ -215,7 +215,7 @@ class SimulatedRig:
         self.last = replace(answer, cpu_s=self._cpu_s)
         return case
 
-    def recorded(self, table: CommandTable, name: str) -> Recording:
+    def recorded(self, table: CommandTable, name: str) -> RigRecording:
         """Readings of a motion that is played after all earlier ones and a rest."""
         ticks = np.arange(0.0, table.time[-1], TICK)
         columns = [table.joints.index(joint) for joint in self._case.true.joint_names()]
@@ -251,18 +251,21 @@ def _since(readings: Readings, begin: int) -> Readings:
 
 
 def explained(
-    recordings: Sequence[Recording],
+    recordings: Sequence[RigRecording],
     plant: PlantDescription,
     motion_s: float,
     known: Known = MappingProxyType({}),
 ) -> tuple[ExplainedCase, _Answer]:
     """Explain recordings of one rig together, on one core."""
     inputs = [
-        Inputs(Sources(Path(one.name), plant, quick=True, known=known), audit_recording(one, plant))
+        Inputs(
+            Sources(Path(one.name), plant, quick=True, jobs=1, known=known),
+            audit_recording(one, plant),
+        )
         for one in recordings
     ]
     begun, begun_cpu = time.monotonic(), time.process_time()
-    case = explain_case(inputs_joined(inputs), jobs=1)
+    case = explain_case(inputs_joined(inputs))
     explanation = replace(
         case.explanation, verdict=case.verdict, effects=case.effects, augmented=case.plant
     )
@@ -270,7 +273,7 @@ def explained(
     return case, _Answer(explanation, motion_s, seconds, cpu_s)
 
 
-def fixed_motion(first: Motion, duration: float) -> CommandTable:
+def fixed_motion(first: RigMotion, duration: float) -> CommandTable:
     """A motion of some length, fixed beforehand: the first one, then all of the library in turn."""
     # The library is what the loop chooses from, in its order, on one joint after the other.
     joints, names = first.joint.split(' and '), first.table.joints

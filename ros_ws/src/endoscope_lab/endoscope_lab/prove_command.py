@@ -56,8 +56,8 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_core.atomic_output import make_parent, require_free_directory, write_text
     from endoscope_core.errors import EndoscopeError
     from endoscope_lab.proof import sentences
+    from endoscope_lab.proof.comparison_page import page
     from endoscope_lab.proof.drawing import require_drawn
-    from endoscope_lab.proof.page import page
     from endoscope_lab.proof.proving import Proof, prove
 
     require_free_directory(args.out)

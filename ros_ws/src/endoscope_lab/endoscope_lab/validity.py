@@ -112,7 +112,7 @@ CAUSES: dict[str, Callable[[float], Slow]] = {
 
 
 @dataclass(frozen=True)
-class Row:
+class AgedRig:
     """One rig after some hours."""
 
     cause: str
@@ -127,7 +127,7 @@ class Row:
 def run(args: argparse.Namespace) -> int:
     """Print a table, and draw it on request; return 0."""
     causes = tuple(chosen('cause', args.only, CAUSES))
-    rows = {(row.cause, row.seed, row.hour): row for row in rows_so_far(args.json, Row)}
+    rows = {(row.cause, row.seed, row.hour): row for row in rows_so_far(args.json, AgedRig)}
     calls = [(c, s) for s in args.seeds for c in causes if (c, s, HOURS[-1]) not in rows]
     for done, (call, future) in enumerate(side_by_side(args.jobs, aged, calls), 1):
         for row in future.result():
@@ -142,12 +142,12 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def aged(cause: str, seed: int) -> list[Row]:
+def aged(cause: str, seed: int) -> list[AgedRig]:
     """Calibrate, move and watch a rig in a tube that no fit has used, on one core."""
     with threadpool_limits(1):
         tube, classifier, choice = never_seen_tube(seed, 0), load_classifier(), LawChoice(2)
         first = calibrate(tube, classifier)
-        rows: list[Row] = []
+        rows: list[AgedRig] = []
         for hour in HOURS:
             slow = CAUSES[cause](hour)
             now = replace(tube, plant=plant_after(tube.plant, slow), noise=tube.noise + len(rows))
@@ -158,7 +158,7 @@ def aged(cause: str, seed: int) -> list[Row]:
             )
             size = None if found.size is None else math.degrees(found.size)
             detected = hour > 0.0 and is_detected(tube, slow, first, seed)
-            rows.append(Row(cause, seed, hour, found.class_deg, size, errors, detected))
+            rows.append(AgedRig(cause, seed, hour, found.class_deg, size, errors, detected))
         return rows
 
 
@@ -217,7 +217,7 @@ def is_detected(tube: NeverSeenTube, slow: Slow, first: CalibrationFindings, see
     return any(alarm.at >= _BEFORE_S for alarm in watch.alarms)
 
 
-def table(rows: Sequence[Row], causes: Sequence[str]) -> str:
+def table(rows: Sequence[AgedRig], causes: Sequence[str]) -> str:
     """A line for each cause and hour, means over tubes."""
     columns = ('cause', 'h', 'tubes', 'same class', 'size, deg', *(f'{s}, deg' for s in SCHEMES))
     lines = [table_head(*columns, 'watch reports')]
@@ -237,7 +237,7 @@ def table(rows: Sequence[Row], causes: Sequence[str]) -> str:
     return '\n'.join(lines)
 
 
-def picture(rows: Sequence[Row], causes: Sequence[str]) -> str:
+def picture(rows: Sequence[AgedRig], causes: Sequence[str]) -> str:
     """Errors over hours by each scheme, with the share of tubes in which a watch reports (SVG)."""
     with rc_context(STYLE):
         figure = Figure(figsize=(8.0, 2.3 * math.ceil(len(causes) / 2)), layout='constrained')
@@ -275,5 +275,5 @@ def _mean(values: Iterable[float]) -> float:
     return float(np.mean(numbers)) if numbers else math.nan
 
 
-def _of(rows: Sequence[Row], cause: str, hour: float) -> list[Row]:
+def _of(rows: Sequence[AgedRig], cause: str, hour: float) -> list[AgedRig]:
     return [row for row in rows if (row.cause, row.hour) == (cause, hour)]

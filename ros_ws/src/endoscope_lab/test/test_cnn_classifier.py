@@ -9,8 +9,8 @@ from endoscope_core.classifier.classification import ClassifierError, UnseenTens
 from endoscope_core.classifier.cnn_classifier import (
     INPUT,
     CnnClassifier,
+    Estimates,
     HeldOutCalibration,
-    Judgement,
     course,
 )
 from endoscope_core.classifier.weights_file import load_classifier
@@ -29,7 +29,7 @@ def shipped(request):
 def judgement(size_deg, none=0.0, distance=0.0, gap=0.0):
     sizes = np.deg2rad(np.atleast_1d(size_deg).astype(float))
     one = np.ones_like(sizes)
-    return Judgement(sizes, 0.01 * one, none * one, distance * one, gap * one)
+    return Estimates(sizes, 0.01 * one, none * one, distance * one, gap * one)
 
 
 def strict():
@@ -104,7 +104,7 @@ def test_intervals_hold_their_nominal_share_and_known_tubes_pass():
     true, deviation = generator.random(4000), 0.1 + generator.random(4000)
     error = 3.0 * deviation * generator.standard_normal(4000)
     columns = true + error, deviation, generator.random(4000), generator.random(4000), 0.0 * true
-    first, rest = (Judgement(*(x[k : k + 2000] for x in columns)) for k in (0, 2000))
+    first, rest = (Estimates(*(x[k : k + 2000] for x in columns)) for k in (0, 2000))
     calibration = calibration_of(first, true[:2000], first)
     assert calibration.inflation == pytest.approx(3.0 * 1.645, rel=0.08)
     covered = np.abs(error[2000:]) <= calibration.inflation * deviation[2000:]

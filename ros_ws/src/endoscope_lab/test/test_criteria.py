@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from endoscope_explain.prediction_set import Contest
-from endoscope_lab.concealed.criteria import (
+from endoscope_lab.concealed.derivation import (
     Bank,
     conformal,
     derived,

@@ -5,7 +5,7 @@ import pytest
 from outside_data import REAL, needs
 
 from endoscope_core.errors import InputError
-from endoscope_core.physics.family import Readings, TubeFamily, shipped_family
+from endoscope_core.physics.family import ReadingErrors, TubeFamily, shipped_family
 from endoscope_lab.identification.family_fit import (
     PRIORS,
     TubeRecording,
@@ -23,7 +23,7 @@ MADE_UP = TubeFamily(
         'joint_stiffness': (0.005,),
         'joint_rest_angle': (-0.05, 0.01, 0.02),
     },
-    readings=Readings((0.3, -0.1), 0.05, 0.01),
+    readings=ReadingErrors((0.3, -0.1), 0.05, 0.01),
 )
 
 

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from endoscope_core.names import JOINTS
 from endoscope_core.physics import PlantDescription
 from endoscope_core.rig import shipped_rig
-from endoscope_core.signals.command_file import JOINTS, CommandTable
-from endoscope_explain.investigation.motions import Motion, commissioning, require_allowed
+from endoscope_core.signals.command_file import CommandTable
+from endoscope_explain.investigation.motions import RigMotion, commissioning, require_allowed
 from endoscope_explain.takes import recordings_joined
 from endoscope_lab.investigate import FIXED, KINDS, SimulatedRig, drawn_rig, fixed_motion
 
@@ -16,7 +17,7 @@ RIG = shipped_rig()
 @pytest.mark.parametrize(
     'stratum',
     [
-        pytest.param(s, marks=pytest.mark.nightly if s == 'other_simulator' else ())
+        pytest.param(s, marks=() if s == 'catalogue' else pytest.mark.nightly)
         for s in KINDS.values()
     ],
 )
@@ -65,6 +66,6 @@ def test_the_fixed_motion_is_allowed_and_begins_as_the_requested_one(joints):
     longer = fixed_motion(first, 3.0 * first.duration)
     assert longer.time[-1] == pytest.approx(3.0 * first.duration, abs=1.5)
     np.testing.assert_array_equal(longer.angle[: len(first.table.time)], first.table.angle)
-    require_allowed(Motion(FIXED, '', '', longer), RIG)
+    require_allowed(RigMotion(FIXED, '', '', longer), RIG)
     moved = np.abs(longer.angle[len(first.table.time) :]).max(axis=0) > 0.1
     assert moved.tolist() == [joint in joints for joint in longer.joints]

@@ -1,6 +1,6 @@
 import pytest
 
-from endoscope_lab.papers.row import Row
+from endoscope_lab.papers.row import Figure
 
 
 @pytest.mark.parametrize(
@@ -14,4 +14,4 @@ from endoscope_lab.papers.row import Row
     ],
 )
 def test_the_mean_is_what_is_judged(values, aims, reached):
-    assert Row('x', values, **aims).reached is reached
+    assert Figure('x', values, **aims).reached is reached

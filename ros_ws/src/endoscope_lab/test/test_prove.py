@@ -22,11 +22,11 @@ from endoscope_lab.proof import SIMULATORS, SLAVE, sentences
 from endoscope_lab.proof.drawing import drawn
 from endoscope_lab.proof.slave import tracked
 from endoscope_lab.proof.trial import (
-    Answer,
     BrokenSealError,
     Outcome,
     Passage,
-    Rig,
+    SealedAnswer,
+    SealedRig,
     opened,
     seal,
     write_bag,
@@ -105,13 +105,14 @@ def test_a_seal_is_the_digest_of_its_file_and_breaks_with_it(tmp_path):
 
 def outcome(laws, reported, after=1.0):
     line = np.zeros(2)
-    answer = Answer(
+    answer = SealedAnswer(
         1, 'So.', tuple(reported), 9.0, 5.0, after, Passage('s', 'N', line, line, {}), 1.0
     )
-    rig = Rig(1, None, '', tuple(laws), frozenset(), 0.2)
+    rig = SealedRig(1, None, '', tuple(laws), frozenset(), 0.2)
     return Outcome(rig, answer, {}, judged(laws, answer.reported))
 
 
+@pytest.mark.nightly
 def test_a_proof_from_end_to_end(tmp_path, capsys):
     out = tmp_path / 'proof'
     command = f'prove --n 1 --seed 4 --effect load_cell_gain --out {out}'

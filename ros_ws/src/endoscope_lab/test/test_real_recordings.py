@@ -3,7 +3,7 @@ import pytest
 from outside_data import REAL, needs
 
 from endoscope_core.hysteresis.inverse import MODELS
-from endoscope_core.identification import Recording
+from endoscope_core.identification import HysteresisRecording
 from endoscope_lab.papers.real_recordings import hysteresis_model, left_of_the_rest, real_recordings
 from endoscope_lab.real.prandtl_ishlinskii import fitted
 
@@ -35,5 +35,5 @@ def test_a_sum_of_plays_is_found_again():
     for angle in driver:
         state = min(max(state, angle - 0.45), angle + 0.45)
         actual.append(0.1 * angle + 0.7 * state + 0.02)
-    recording = Recording(driver, np.array(actual))
+    recording = HysteresisRecording(driver, np.array(actual))
     np.testing.assert_allclose(fitted(recording, driver), actual, atol=0.002)

@@ -6,7 +6,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from endoscope_bringup.subcommands import COUNT, within
+from endoscope_bringup.subcommands import add_options, within
+from endoscope_explain.options import Options
 
 if TYPE_CHECKING:
     from endoscope_core.rig import Rig
@@ -73,9 +74,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         default='endoscope',
         help='namespace of the running graph (default: %(default)s)',
     )
-    parser.add_argument(
-        '--jobs', type=COUNT, default=2, metavar='N', help='parallel tasks (default 2)'
-    )
+    add_options(parser, Options, 'jobs')
 
 
 def run(args: argparse.Namespace) -> int:
@@ -88,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
     from endoscope_core.errors import EndoscopeError
     from endoscope_core.investigation_folder import PAGE, held
     from endoscope_core.rig import load_rig
-    from endoscope_explain.investigation import page
+    from endoscope_explain.investigation import index_page
     from endoscope_explain.investigation.investigation import (
         Investigation,
         explain_together,
@@ -110,7 +109,7 @@ def run(args: argparse.Namespace) -> int:
             player.play,
             lambda bags, known: explain_together(bags, known, of, step),
             track=player.play,
-            page=lambda log: page.page(log, of.folder),
+            page=lambda log: index_page.page(log, of.folder),
             report=say,
         )
 

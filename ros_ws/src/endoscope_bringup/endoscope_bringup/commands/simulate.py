@@ -4,7 +4,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from endoscope_bringup.subcommands import seed
+from endoscope_bringup.subcommands import add_options, seed
+from endoscope_explain.options import Options
 
 WORTH_SAYING = 0.02
 """Largest error of a formula's table without a warning, as a share of the formula's range."""
@@ -35,12 +36,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         metavar='BAG2',
         help='where to write: a bare file if it ends in .mcap, else a folder',
     )
-    parser.add_argument(
-        '--rig',
-        type=Path,
-        metavar='rig.yaml',
-        help='rig file, if the bag contains none (default: the shipped rig)',
-    )
+    add_options(parser, Options, 'rig')
     parser.add_argument(
         '--noise',
         type=seed,

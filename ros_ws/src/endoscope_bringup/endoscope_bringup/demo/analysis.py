@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_bags import Recording, open_bag
-from endoscope_bringup.demo.procedure import CalibrationFacts, Segment
+from endoscope_bringup.demo.procedure import CalibrationFacts, RecordedRun
 from endoscope_bringup.demo.results import CalibrationOutcome, DemoResults, TrackingRun
 from endoscope_core.signals import (
     CALIBRATION_RECORD_DURATION,
@@ -28,7 +28,7 @@ LATEST_START_S = 3.0
 
 def analyse(
     bags: dict[str, Path],
-    segments: Sequence[Segment],
+    segments: Sequence[RecordedRun],
     calibrations: Sequence[CalibrationFacts],
     lost: dict[str, int],
 ) -> DemoResults:
@@ -90,7 +90,7 @@ class Angles:
         return np.column_stack(columns)
 
 
-def run_of(angles: Angles, segment: Segment) -> TrackingRun:
+def run_of(angles: Angles, segment: RecordedRun) -> TrackingRun:
     """The steady part of a run, beside what was asked for."""
     own = angles.between(segment.start, segment.end)
     signal = motion_by_name(segment.motion).joints[names.JOINTS[0]]
@@ -127,7 +127,7 @@ def start_of_motion(time: Array, desired: Array, signal: Signal) -> float:
     return float(min(np.arange(coarse - 0.02, coarse + 0.02, 0.001), key=misfit))
 
 
-def _noise(angles: dict[str, Angles], segments: Sequence[Segment]) -> float:
+def _noise(angles: dict[str, Angles], segments: Sequence[RecordedRun]) -> float:
     """Of the tracker in degrees, rms, from the rests before the runs."""
     rests = [angles[s.tube].between(s.start - REST_S, s.start).actual for s in segments]
     return float(np.degrees(np.sqrt(np.mean([np.var(rest, axis=0, ddof=1) for rest in rests]))))

@@ -22,7 +22,7 @@ from endoscope_nodes.runtime.node_context import NodeContext
 from endoscope_nodes.runtime.private_domain import process_domain
 from endoscope_nodes.runtime.runtime import FOREVER_S, Runtime
 
-PATIENCE_S = 60.0
+DEMO_PATIENCE_S = 60.0
 POLL_S = 0.05
 RATE = {True: 500, False: 1000}
 """Ticks a second in lock-step and in real time."""
@@ -51,7 +51,7 @@ class LiveGraph(ClosedOnExit):
         given = dict(overrides)
         if lock_step:
             # Load cells may fall silent.
-            clock = {'timeout': PATIENCE_S, 'wait_for': [MOTOR_MEASURED]}
+            clock = {'timeout': DEMO_PATIENCE_S, 'wait_for': [MOTOR_MEASURED]}
             given[CLOCK_NODE] = clock | overrides.get(CLOCK_NODE, {})
         if bag is not None:
             given['recorder'] = {'bag': str(bag)}
@@ -75,7 +75,7 @@ class LiveGraph(ClosedOnExit):
             raise
 
     def _connect(self) -> None:
-        limit = time.monotonic() + PATIENCE_S
+        limit = time.monotonic() + DEMO_PATIENCE_S
         while not (self.client.is_connected() and self._runtime.connected()):
             if time.monotonic() > limit:
                 raise GraphError('the nodes did not find each other: is multicast allowed?')

@@ -39,7 +39,7 @@ class Tube:
 
 
 @dataclass(frozen=True)
-class Segment:
+class RecordedRun:
     """One recorded run: a motion tracked by one method, in seconds of the headers' clock."""
 
     tube: str
@@ -62,11 +62,11 @@ class CalibrationFacts:
 
 
 @dataclass(frozen=True)
-class TubeRecording:
+class RecordedTube:
     """What became of one tube: its bag, what was done when, and what the recorder missed."""
 
     bag: Path
-    segments: tuple[Segment, ...]
+    segments: tuple[RecordedRun, ...]
     calibration: CalibrationFacts
     lost: dict[str, int]
 

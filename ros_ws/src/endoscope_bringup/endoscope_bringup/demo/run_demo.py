@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from endoscope_bringup.demo.analysis import analyse
-from endoscope_bringup.demo.page import report_page
-from endoscope_bringup.demo.procedure import TUBES, Tube, TubeRecording
+from endoscope_bringup.demo.procedure import TUBES, RecordedTube, Tube
+from endoscope_bringup.demo.report_page import report_page
 from endoscope_bringup.demo.results import DemoResults, table_rows
 from endoscope_core.atomic_output import write_text
 from endoscope_core.workers import worker_pool
@@ -77,7 +77,7 @@ def _run_tubes(
     seed: int,
     real_time: bool,
     progress: Callable[[str], None],
-) -> list[TubeRecording]:
+) -> list[RecordedTube]:
     """Run tubes side by side in processes of their own, each in its own ROS domain."""
     progress('loading the nodes, which takes some seconds')
     here = int(os.environ.get('ROS_DOMAIN_ID', '0'))
@@ -93,14 +93,14 @@ def _run_tubes(
         return [run.result() for run in runs]
 
 
-def _run_tube(tube: Tube, **how: Any) -> TubeRecording:
+def _run_tube(tube: Tube, **how: Any) -> RecordedTube:
     # Imported by the process that runs the nodes alone: it takes seconds.
     from endoscope_bringup.demo.run_tube import run_tube
 
     return run_tube(tube, **how)
 
 
-def _summed_losses(recordings: Sequence[TubeRecording]) -> dict[str, int]:
+def _summed_losses(recordings: Sequence[RecordedTube]) -> dict[str, int]:
     losses: Counter[str] = Counter()
     for recording in recordings:
         losses.update(recording.lost)

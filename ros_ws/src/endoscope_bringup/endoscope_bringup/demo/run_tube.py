@@ -15,9 +15,9 @@ from endoscope_bringup.demo.procedure import (
     MOTIONS,
     CalibrationFacts,
     Method,
-    Segment,
+    RecordedRun,
+    RecordedTube,
     Tube,
-    TubeRecording,
 )
 from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.physics.family import shipped_family
@@ -42,7 +42,7 @@ PATIENCE_OF_TIME_S = 120.0
 
 def run_tube(
     tube: Tube, folder: Path, *, domain: int, seed: int, real_time: bool, progress: Progress
-) -> TubeRecording:
+) -> RecordedTube:
     """Enable, calibrate, and track every motion by every method on one simulated tube."""
     name = tube.name.replace(' ', '_')
     plant_file = folder / f'{name}.plant.yaml'
@@ -79,7 +79,7 @@ def run_tube(
             _track(graph, tube, motion, method, say) for motion in MOTIONS for method in Method
         )
         graph.client.ask('disable')
-        return TubeRecording(bag, segments, calibration, graph.stop())
+        return RecordedTube(bag, segments, calibration, graph.stop())
 
 
 def _calibrate(graph: LiveGraph, tube: Tube, progress: Progress) -> CalibrationFacts:
@@ -121,7 +121,7 @@ def _calibrate(graph: LiveGraph, tube: Tube, progress: Progress) -> CalibrationF
 
 def _track(
     graph: LiveGraph, tube: Tube, motion: str, method: Method, progress: Progress
-) -> Segment:
+) -> RecordedRun:
     """Track one motion by one method."""
     progress(f'tracking {MOTION_TITLE[motion]}, {method}')
     graph.set('compensator', **COMPENSATOR[method])
@@ -133,4 +133,4 @@ def _track(
     graph.set(MASTER_NODE, source='none')
     if graph.client.state != 'ENABLED':
         raise GraphError(f'{tube.name}, {motion}: {graph.client.state}: {graph.client.why}')
-    return Segment(tube.name, motion, method, start, end)
+    return RecordedRun(tube.name, motion, method, start, end)

@@ -34,14 +34,14 @@ _ANSWERED_S = 2.0
 
 
 @dataclass(frozen=True)
-class Reply:
+class GraphReply:
     """What the graph answered."""
 
     lines: tuple[str, ...]  # in words, the answer itself first
     values: dict[str, Any] = field(default_factory=dict)  # the same for programs
 
 
-def act(client: GraphClient, args: argparse.Namespace) -> Reply:
+def act(client: GraphClient, args: argparse.Namespace) -> GraphReply:
     """Do what the command line asks for."""
     action, patience_s = args.action, args.timeout
     if action == 'get':
@@ -52,28 +52,28 @@ def act(client: GraphClient, args: argparse.Namespace) -> Reply:
         client.find(patience_s)
         if args.what == 'mark':
             bag = client.mark(args.text, patience_s)
-            return Reply((f'marked: what led to it goes to {bag}',), {'bag': bag})
+            return GraphReply((f'marked: what led to it goes to {bag}',), {'bag': bag})
         service = names.RECORDER_START if args.what == 'start' else names.RECORDER_STOP
         answer = client.trigger(service, patience_s)
-        return Reply((f'recording to {answer}' if args.what == 'start' else answer,))
+        return GraphReply((f'recording to {answer}' if args.what == 'start' else answer,))
     client.find(patience_s)
     if action in _OF_A_DEVICE:
-        return Reply((client.trigger(_OF_A_DEVICE[action], patience_s),))
+        return GraphReply((client.trigger(_OF_A_DEVICE[action], patience_s),))
     if action == 'status':
-        return Reply(*status_of(client, patience_s))
+        return GraphReply(*status_of(client, patience_s))
     if action == 'adopt':
         return _adopt(client, args.plant, patience_s)
     if action == 'calibrate':
         return _calibrate(client, patience_s)
     if action == 'home':
-        return Reply((client.home(patience_s),))
+        return GraphReply((client.home(patience_s),))
     state = client.ask_and_see(action, patience_s)
     if state == 'ENABLED':
-        return Reply((f'{state}, {client.session}',), {'session': client.session})
-    return Reply((state,))
+        return GraphReply((f'{state}, {client.session}',), {'session': client.session})
+    return GraphReply((state,))
 
 
-def _adopt(client: GraphClient, file: str | None, patience_s: float) -> Reply:
+def _adopt(client: GraphClient, file: str | None, patience_s: float) -> GraphReply:
     """Put a plant file into force, or without one the plant before."""
     text = '' if file is None else plant_text(Path(file))
     now = AdoptedPlants(client).adopt(text, patience_s)
@@ -87,10 +87,10 @@ def _adopt(client: GraphClient, file: str | None, patience_s: float) -> Reply:
             for joint, within in zip(names.JOINTS, now.ranges, strict=False)
         },
     }
-    return Reply((now.answer, *reach), values)
+    return GraphReply((now.answer, *reach), values)
 
 
-def _calibrate(client: GraphClient, patience_s: float) -> Reply:
+def _calibrate(client: GraphClient, patience_s: float) -> GraphReply:
     try:
         with ProgressLine() as bar:
             result = client.calibrate(bar.show, patience_s)
@@ -99,14 +99,14 @@ def _calibrate(client: GraphClient, patience_s: float) -> Reply:
         if client.state == 'FAULT' and client.wait_until(lambda: bool(client.why), patience_s):
             raise GraphError(f'{error} ({client.state}: {client.why})') from error
         raise
-    return Reply(calibration_in_words(result), {'result': result.values})
+    return GraphReply(calibration_in_words(result), {'result': result.values})
 
 
-def _get(client: GraphClient, name: str, patience_s: float) -> Reply:
+def _get(client: GraphClient, name: str, patience_s: float) -> GraphReply:
     if '.' not in name.strip('/'):
         return _list(client, name.strip('/'), patience_s)
     parameter = read_parameter(client, name, patience_s)
-    return Reply(
+    return GraphReply(
         (f'{name} = {_in_words(parameter.value)}', f'    {parameter.description}'),
         {
             'node': parameter.node,
@@ -117,10 +117,10 @@ def _get(client: GraphClient, name: str, patience_s: float) -> Reply:
     )
 
 
-def _list(client: GraphClient, node: str, patience_s: float) -> Reply:
+def _list(client: GraphClient, node: str, patience_s: float) -> GraphReply:
     parameters = read_parameters(client, node, patience_s)
     width = max(len(parameter.name) for parameter in parameters)
-    return Reply(
+    return GraphReply(
         tuple(
             f'{node}.{p.name:<{width}} = {_in_words(p.value)}    {p.description}'
             for p in parameters
@@ -135,7 +135,7 @@ def _list(client: GraphClient, node: str, patience_s: float) -> Reply:
     )
 
 
-def _set(client: GraphClient, name: str, text: str, patience_s: float) -> Reply:
+def _set(client: GraphClient, name: str, text: str, patience_s: float) -> GraphReply:
     parameter = read_parameter(client, name, patience_s)
     node, value = parameter.node, parameter.parse(text)
     set_parameters(client, node, {parameter.name: value}, patience_s)
@@ -149,7 +149,7 @@ def _set(client: GraphClient, name: str, text: str, patience_s: float) -> Reply:
         for part, health in client.health.items()
         if part.partition(':')[0] == node and health.level
     }
-    return Reply(
+    return GraphReply(
         (
             f'{name} = {_in_words(now)}, was {_in_words(parameter.value)}',
             *(f'    {part}: {message}' for part, message in errors.items()),

@@ -12,7 +12,7 @@ from endoscope_core.errors import nearest, printable
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import GraphError
 from endoscope_nodes.runtime.recorded_topics import message_class, suitable_qos
-from endoscope_nodes.topics import BY_NAME, TOPICS, Topic
+from endoscope_nodes.topics import BY_NAME, TOPICS, GraphTopic
 
 _HEADINGS = ('topic', 'type', 'senders', 'readers', '')
 _ROS_OWN = ('/parameter_events', '/rosout')
@@ -42,7 +42,7 @@ def listing(client: GraphClient, patience_s: float, as_json: bool) -> None:
         print('  '.join(cells).rstrip())
 
 
-def _row(client: GraphClient, name: str, topic: Topic | None) -> dict[str, Any]:
+def _row(client: GraphClient, name: str, topic: GraphTopic | None) -> dict[str, Any]:
     readers = [
         info.node_name
         for info in client.node.get_subscriptions_info_by_topic(_full(client, name))
@@ -62,7 +62,7 @@ def _row(client: GraphClient, name: str, topic: Topic | None) -> dict[str, Any]:
     }
 
 
-def _missing(topic: Topic | None, senders: list[str], silent: list[str]) -> str:
+def _missing(topic: GraphTopic | None, senders: list[str], silent: list[str]) -> str:
     if topic is None:
         return ''
     if topic.one_sender and len(senders) > 1:

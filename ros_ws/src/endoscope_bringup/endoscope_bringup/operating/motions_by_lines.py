@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TextIO
 
 from endoscope_core.errors import EndoscopeError, NotPlayedError, RigStoppedError
-from endoscope_explain.investigation.motions import Motion
+from endoscope_explain.investigation.motions import RigMotion
 
 
 class MotionsByLines:
@@ -18,7 +18,7 @@ class MotionsByLines:
         """Write a sentence of the log."""
         self._write({'say': sentence})
 
-    def play(self, motion: Motion, file: Path, bag: Path, plant: Path | None = None) -> None:
+    def play(self, motion: RigMotion, file: Path, bag: Path, plant: Path | None = None) -> None:
         """Have a motion played and recorded; see `endoscope_nodes.client.motion_player`."""
         asked = {
             'words': motion.words,

@@ -29,7 +29,7 @@ class MalformedFrameError(EndoscopeError, ValueError):
     """A frame that is not one; the message says what is wrong with it."""
 
 
-class Source(IntEnum):
+class InputDevice(IntEnum):
     """Input device of a frame."""
 
     KEYBOARD = 0
@@ -46,7 +46,7 @@ class InputFrame:
     visible: bool  # whether the page is shown
     focused: bool  # whether the page has the keyboard
     position_mode: bool  # whether `x` and `y` are angles and not speeds
-    # One of `Source`. The frame that ends a grip names the source of the grip; where it names
+    # One of `InputDevice`. The frame that ends a grip names the source of the grip; where it names
     # another, the device of the grip is gone.
     source: int
     seq: int  # number of the frame, counting up
@@ -66,7 +66,7 @@ def decode_input(data: bytes) -> InputFrame:
         raise MalformedFrameError(f'an input frame is of kind {INPUT}, not {kind}')
     if flags & ~_KNOWN_FLAGS:
         raise MalformedFrameError(f'an input frame has no flags {flags & ~_KNOWN_FLAGS:#x}')
-    if source not in tuple(Source):
+    if source not in tuple(InputDevice):
         raise MalformedFrameError(f'a page has no source {source}')
     if not (abs(t) <= _LAST_S and math.isfinite(x) and math.isfinite(y)):
         raise MalformedFrameError(f'no time in s and two angles: {t}, {x}, {y}')

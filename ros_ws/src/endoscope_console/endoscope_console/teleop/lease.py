@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass
 
-SILENCE_NS = 2_000_000_000
+LEASE_SILENCE_NS = 2_000_000_000
 """Without a sign of its holder the lease ends."""
 UNATTENDED_NS = 5_000_000_000
 """A motion session whose operator has gone is paused after so long without another one."""
 
 
 @dataclass(frozen=True)
-class Claim:
+class ClaimOutcome:
     """Outcome of a claim."""
 
     granted: bool  # whether the client holds the lease now
@@ -25,18 +25,18 @@ class Lease:
         self.since_ns = 0  # 0 for nobody
         self._heard_ns = 0
 
-    def claim(self, client: str, take: bool, now_ns: int) -> Claim:
+    def claim(self, client: str, take: bool, now_ns: int) -> ClaimOutcome:
         """Ask for the lease, or `take` it from whoever holds it."""
         if not client:
             raise ValueError('a client without a name cannot hold the lease')
         holder = self.holder
         if holder == client:
             self._heard_ns = now_ns
-            return Claim(True)
+            return ClaimOutcome(True)
         if holder and not take:
-            return Claim(False, f'{holder} is the operator')
+            return ClaimOutcome(False, f'{holder} is the operator')
         self.holder, self.since_ns, self._heard_ns = client, now_ns, now_ns
-        return Claim(True, lost_by=holder)
+        return ClaimOutcome(True, lost_by=holder)
 
     def release(self, client: str) -> None:
         """Give the lease back; nothing where another holds it."""
@@ -50,7 +50,7 @@ class Lease:
 
     def turn(self, now_ns: int) -> str:
         """Judge at `now_ns`: who has just lost the lease by silence; empty for nobody."""
-        if not self.holder or now_ns - self._heard_ns < SILENCE_NS:
+        if not self.holder or now_ns - self._heard_ns < LEASE_SILENCE_NS:
             return ''
         silent = self.holder
         self.release(silent)

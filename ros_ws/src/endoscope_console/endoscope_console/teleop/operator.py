@@ -4,12 +4,12 @@ from collections import Counter
 from dataclasses import dataclass
 from enum import StrEnum
 
-from endoscope_console.teleop.frames import InputFrame, Source
+from endoscope_console.teleop.frames import InputDevice, InputFrame
 from endoscope_core import teleop as rule
 from endoscope_core.choices import FOLLOW_THE_HANDLE
 from endoscope_core.teleop import DeadMan
 
-SILENCE_NS = 100_000_000
+FRAME_SILENCE_NS = 100_000_000
 """After the last arrival of a frame a grip is over."""
 LATE_NS = 100_000_000
 """A frame that took so much longer than the quickest is not obeyed."""
@@ -155,7 +155,7 @@ class OperatorDeadMan:
             return
         sender = self._senders.setdefault(client, _Sender())
         fault = sender.fault(frame, now_ns)
-        self._dead_man.hear(now_ns, self._number(sender, frame), SILENCE_NS - 1)
+        self._dead_man.hear(now_ns, self._number(sender, frame), FRAME_SILENCE_NS - 1)
         ended = fault
         if self.engaged:
             silent = None if self._dead_man.held else Reason.SILENT
@@ -234,7 +234,7 @@ class OperatorDeadMan:
             return Reason.UNFOCUSED
         grip, source, position_mode = self._of_grip
         if not frame.pressed:
-            gone = source == Source.GAMEPAD != frame.source
+            gone = source == InputDevice.GAMEPAD != frame.source
             return Reason.UNPLUGGED if gone else Reason.RELEASED
         same = (frame.grip, frame.source, frame.position_mode) == (grip, source, position_mode)
         return None if same else Reason.RELEASED

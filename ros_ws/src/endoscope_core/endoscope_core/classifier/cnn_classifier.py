@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from endoscope_core.classifier.classification import (
     HALF_CLASS,
     LEVEL,
-    WIRES,
+    WIRE_COUNT,
     ClassificationResult,
     UnseenTensionError,
     checked_tension,
@@ -61,7 +61,7 @@ class HeldOutCalibration:
 
 
 @dataclass(frozen=True)
-class Judgement:
+class Estimates:
     """What the network makes of R recordings; all arrays (R,)."""
 
     size: Array  # backlash size in rad, mean of the joints
@@ -108,8 +108,8 @@ def logarithm(tension: Single) -> Single:
 
 def cnn_shapes(classes: int) -> dict[str, tuple[int, ...]]:
     """Shape of each array of weights of the network for a number of classes."""
-    shapes: dict[str, tuple[int, ...]] = {'offset': (WIRES,), 'scale': (WIRES,)}
-    for k, (width, wider) in enumerate(zip((WIRES, *CHANNELS), CHANNELS, strict=False)):
+    shapes: dict[str, tuple[int, ...]] = {'offset': (WIRE_COUNT,), 'scale': (WIRE_COUNT,)}
+    for k, (width, wider) in enumerate(zip((WIRE_COUNT, *CHANNELS), CHANNELS, strict=False)):
         shapes |= {f'filter.{k}': (STRIDE * width, wider), f'bias.{k}': (wider,)}
     outputs, features = classes + OWN_OUTPUTS, CHANNELS[-1]
     shapes |= {'dense': (features, outputs), 'bias': (outputs,)}
@@ -157,20 +157,20 @@ class CnnClassifier:
         The wires are in the order x_pos, x_neg, y_pos, y_neg. UnseenTensionError where the tensions
         are unlike any of the training, or their size is none of the classes.
         """
-        array = checked_tension(tension, (self._samples, WIRES))
+        array = checked_tension(tension, (self._samples, WIRE_COUNT))
         judgement = self.judged(course(array, self.motion)[None])
         [reason] = self.reasons_to_refuse(judgement)
         if reason:
             raise UnseenTensionError(f'none of the classes: {reason}')
         return self.results(judgement)[0]
 
-    def judged(self, courses: Single) -> Judgement:
+    def judged(self, courses: Single) -> Estimates:
         """What the network makes of courses (R, 6561, 4)."""
         outputs, features = evaluated(self.weights, courses)
         with np.errstate(over='ignore', invalid='ignore'):
             size, logarithm_of, none = outputs[:, len(self.classes_deg) :].T
             white = (features - self.weights['centre']) @ self.weights['whitening']
-            return Judgement(
+            return Estimates(
                 MIDDLE + UNIT * size,
                 LEAST_DEVIATION + UNIT * np.exp(logarithm_of),
                 1.0 / (1.0 + np.exp(-none)),
@@ -178,7 +178,7 @@ class CnnClassifier:
                 self._gap(courses),
             )
 
-    def reasons_to_refuse(self, judgement: Judgement) -> list[str]:
+    def reasons_to_refuse(self, judgement: Estimates) -> list[str]:
         """Why each of R recordings is none of the classes; empty where it may be one."""
         smallest, greatest = self._range
         found = []
@@ -205,7 +205,7 @@ class CnnClassifier:
                 found.append('')
         return found
 
-    def results(self, judgement: Judgement) -> list[ClassificationResult]:
+    def results(self, judgement: Estimates) -> list[ClassificationResult]:
         """Result for each of R recordings, whether it is to be refused or not."""
         spread = self._half_width(judgement) / _NORMAL.inv_cdf(0.5 + 0.5 * LEVEL)
         return [
@@ -226,10 +226,10 @@ class CnnClassifier:
         ends = np.deg2rad([self.classes_deg[0], self.classes_deg[-1]])
         return float(ends[0] - HALF_CLASS), float(ends[1] + HALF_CLASS)
 
-    def _intervals(self, judgement: Judgement) -> list[tuple[float, float]]:
+    def _intervals(self, judgement: Estimates) -> list[tuple[float, float]]:
         half = self._half_width(judgement)
         low, high = judgement.size - half, judgement.size + half
         return list(zip(low.tolist(), high.tolist(), strict=True))
 
-    def _half_width(self, judgement: Judgement) -> Array:
+    def _half_width(self, judgement: Estimates) -> Array:
         return judgement.deviation * self.calibration.inflation

@@ -34,7 +34,7 @@ _FIRST_PERIOD_S = 1e-3
 _AT_ZERO = (0.0,) * len(JOINTS)
 
 
-class Source(StrEnum):
+class Commander(StrEnum):
     """Whose commands are obeyed."""
 
     NOBODY = 'nobody'
@@ -77,7 +77,7 @@ class CommandStream:
         )
         most = (facts.drive * facts.gear, shafts.speed, shafts.acceleration, shafts.step)
         self.shaper = MotionShaper(MotionLimits.either_way(len(MOTORS), *most))
-        self.source = Source.NOBODY
+        self.source = Commander.NOBODY
         self.corrected = False  # whether a correction is added
         self.cut = RangeCut()
         self._law, self._gear, self._resolution = law, facts.gear, shafts.resolution
@@ -93,13 +93,13 @@ class CommandStream:
         for gate in (self.gate, self.calibration_gate, self.correction_gate):
             gate.reset()
         self._corrections.restart()
-        self.source = Source.NOBODY
+        self.source = Commander.NOBODY
 
     def end_master(self) -> None:
         """The clutch was released: whatever is commanded after it begins at the measured pose."""
         self.gate.reset()
-        if self.source is Source.MASTER:
-            self.source = Source.NOBODY
+        if self.source is Commander.MASTER:
+            self.source = Commander.NOBODY
 
     def correct(self, correction: Command, now_ns: int) -> None:
         """Take a correction, to be added to the master's commands after it."""
@@ -119,7 +119,7 @@ class CommandStream:
         if not held:
             self.gate.refuse(Refusal.CLUTCH)
             return ()
-        step = self._obey(Source.MASTER, self.gate, command, now_ns, measured.bending, measured)
+        step = self._obey(Commander.MASTER, self.gate, command, now_ns, measured.bending, measured)
         if step is None:
             return ()
         seconds, begins = step
@@ -147,7 +147,7 @@ class CommandStream:
         shafts = measured.shafts
         start = None if shafts is None else tuple(x / self._gear for x in shafts)
         step = self._obey(
-            Source.CALIBRATION, self.calibration_gate, command, now_ns, start, measured
+            Commander.CALIBRATION, self.calibration_gate, command, now_ns, start, measured
         )
         if step is None:
             return ()
@@ -160,14 +160,14 @@ class CommandStream:
     def watch(self, now_ns: int, measured: Measured, held: bool) -> str:
         """Notice streams that have ended; why the motion session must end, or nothing."""
         reason = ''
-        if self.source is Source.MASTER and not self.gate.is_fresh(now_ns):
-            self.source = Source.NOBODY
+        if self.source is Commander.MASTER and not self.gate.is_fresh(now_ns):
+            self.source = Commander.NOBODY
             if held:
                 refused = f' ({self.gate.last_reason})' if self.gate.last_reason else ''
                 reason = f'{SLAVE_COMMAND} ended while the clutch was held{refused}'
-        elif self.source is Source.CALIBRATION and not self.calibration_gate.is_fresh(now_ns):
-            self.source = Source.NOBODY
-        if self.source is Source.NOBODY:
+        elif self.source is Commander.CALIBRATION and not self.calibration_gate.is_fresh(now_ns):
+            self.source = Commander.NOBODY
+        if self.source is Commander.NOBODY:
             self._law.take_pending()
             return reason
         # By the time of the measurement: motors that are silent do not stand still, and silence
@@ -176,7 +176,7 @@ class CommandStream:
 
     def check_rest(self, now_ns: int, measured: Measured, plant: AdoptedPlant | None) -> None:
         """AdoptionError where the slave moves, or is bent further than a plant allows."""
-        if now_ns - self._moved_ns < _REST_NS or self.source is Source.CALIBRATION:
+        if now_ns - self._moved_ns < _REST_NS or self.source is Commander.CALIBRATION:
             raise AdoptionError(
                 AdoptionCode.MOVING, 'the slave is moving: plants are exchanged only at rest'
             )
@@ -185,12 +185,12 @@ class CommandStream:
                 AdoptionCode.NOT_MEASURED, f'{MOTOR_MEASURED} is silent: no pose is known'
             )
         if plant is not None:
-            before = self._angle if self.source is Source.MASTER else measured.bending
+            before = self._angle if self.source is Commander.MASTER else measured.bending
             plant.check_within(before, JOINTS)
 
     def _obey(
         self,
-        source: Source,
+        source: Commander,
         gate: CommandGate,
         command: Command,
         now_ns: int,

@@ -21,7 +21,7 @@ class Selection(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Before:
+class BeforeAdoption:
     """What was in force before a plant was adopted."""
 
     plant: AdoptedPlant | None  # None where it was no adopted one
@@ -45,7 +45,7 @@ class LawInForce:
         self.error = ''  # why the mode is not available
         self.changed = True  # whoever reports what is in force takes it back
         self._choice = choice
-        self._before: list[Before] = []
+        self._before: list[BeforeAdoption] = []
         self._by_adopted = False
         try:
             feedforward.compile(choice.law(selection.mode, BY_CLASS, _ANY_CLASS))
@@ -65,7 +65,7 @@ class LawInForce:
         return () if self.findings is None else self.findings.ranges
 
     @property
-    def before(self) -> Before | None:
+    def before(self) -> BeforeAdoption | None:
         """What :meth:`undo` puts in force again; None where no plant has been adopted."""
         return self._before[-1] if self._before else None
 
@@ -96,7 +96,7 @@ class LawInForce:
 
     def adopt(self, plant: AdoptedPlant, for_session: bool) -> None:
         """Have a plant for the next selection; `for_session` as the selection in force is."""
-        self._before.append(Before(self.plant, self.selection, for_session))
+        self._before.append(BeforeAdoption(self.plant, self.selection, for_session))
         self.plant = plant
 
     def undo(self) -> None:
@@ -110,20 +110,16 @@ class LawInForce:
 
     def figures(self, lead: float, gear: float) -> dict[str, object]:
         """What is in force and what is selected, with the `lead` in s and the rig's `gear`."""
-        mode, selected_by = self.selection
-        law = self.feedforward.law
-        values: dict[str, object] = {
+        law, found = self.feedforward.law, self.findings
+        return {
             'mode': law.mode,
-            'wanted_mode': mode,
-            'selected_by': selected_by,
+            'wanted_mode': self.selection.mode,
+            'selected_by': self.selection.selected_by,
             'lead': lead,
             'gear': gear,
+            'class_deg': None if found is None else found.class_deg,
+            **{joint: p.to_dict() for joint, p in zip(JOINTS, law.parameters, strict=False)},
         }
-        if self.findings is not None and self.findings.class_deg is not None:
-            values['class_deg'] = self.findings.class_deg
-        for joint, parameters in zip(JOINTS, law.parameters, strict=False):
-            values |= {f'{joint}.{key}': value for key, value in parameters.to_dict().items()}
-        return values
 
     def in_words(self, remedy: str) -> str:
         """What is compensated by, or why nothing is; `remedy` is how to calibrate."""

@@ -28,7 +28,7 @@ class Desired(NamedTuple):
     velocity: Angles
 
 
-class Source(ABC):
+class MotionSource(ABC):
     """Says where the slave is to be, tick by tick, from a pose at which it is."""
 
     def __init__(self, limits: MotionLimits) -> None:
@@ -51,7 +51,7 @@ class Source(ABC):
         """Where the slave is to be now, `periods` ms after the last time."""
 
 
-class PlayedMotion(Source):
+class PlayedMotion(MotionSource):
     """A motion that is approached, goes on where it stood still, and is held at its end.
 
     `speed` is the largest of the approach in rad/s; with `hold` it waits for the clutch.
@@ -103,7 +103,7 @@ class PlayedMotion(Source):
         return len(self._motion) * _TICK_S
 
 
-class FollowedHandle(Source):
+class FollowedHandle(MotionSource):
     """A handle, from where the slave is whenever the clutch is engaged or the handle was silent."""
 
     def __init__(self, limits: MotionLimits, handle: Handle, scale: float) -> None:
@@ -132,7 +132,7 @@ class FollowedHandle(Source):
         return self.followed or Desired(position, (0.0,) * len(position))
 
 
-class CommandedVelocity(Source):
+class CommandedVelocity(MotionSource):
     """Velocities from where the slave is, which another program commands with the clutch held.
 
     They are braked before the end of the range: `cut` only counts and reports that.
@@ -196,7 +196,7 @@ class MasterMotion:
         self.velocities = VelocityStream(
             len(JOINTS), facts.hand_speed, rig.instrument.section_length
         )
-        self.source: Source | None = None
+        self.source: MotionSource | None = None
         self.ranges: tuple[BendingRange, ...] = ()
         self.cut = RangeCut()
         self.moving = False
@@ -225,7 +225,7 @@ class MasterMotion:
         """Move the slave no more."""
         self._take(None)
 
-    def _take(self, source: Source | None) -> None:
+    def _take(self, source: MotionSource | None) -> None:
         self.rest()
         self.source, self._handle_moved = source, False
 
@@ -292,7 +292,7 @@ class MasterMotion:
         self._sent_ns = now_ns
         return Desired(shaped, velocity if as_asked else source.shaper.velocity)
 
-    def _begins(self, source: Source, now_ns: int) -> bool:
+    def _begins(self, source: MotionSource, now_ns: int) -> bool:
         """Begin a stream, but not before the compensator knows that the last one has ended."""
         soon = self._sent_ns is not None and now_ns - self._sent_ns <= self._apart_ns
         pose = None if soon or not source.is_there(now_ns) else self._bending()

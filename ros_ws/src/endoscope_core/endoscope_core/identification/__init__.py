@@ -5,7 +5,7 @@ from endoscope_core.identification.class_parameters import (
     parameters_for_class,
 )
 from endoscope_core.identification.feedforward_fit import FeedforwardFit, Servo, fit_feedforward
-from endoscope_core.identification.hysteresis_fit import ModelFit, Recording, fit_model
+from endoscope_core.identification.hysteresis_fit import HysteresisRecording, ModelFit, fit_model
 from endoscope_core.identification.plant_fit import PlantFit, PlantFitError, fit_plant
 from endoscope_core.identification.updated_table import (
     KINDS,
@@ -18,11 +18,11 @@ from endoscope_core.identification.updated_table import (
 __all__ = [
     'KINDS',
     'FeedforwardFit',
+    'HysteresisRecording',
     'LawParameters',
     'ModelFit',
     'PlantFit',
     'PlantFitError',
-    'Recording',
     'Servo',
     'TableEntry',
     'UpdatedTable',

@@ -88,7 +88,7 @@ FAMILIES: dict[str, ModelFamily] = {
 
 
 @dataclass(frozen=True)
-class Recording:
+class HysteresisRecording:
     """Motor and joint of one recording (N,) in rad, evenly sampled."""
 
     driver: Array  # joint-equivalent motor angle in rad
@@ -124,7 +124,9 @@ class ModelFit:
         return forward(self.parameters, driver, y0) + missing
 
 
-def fit_model(recordings: Sequence[Recording], seed: int = 0, model: str = 'bouc_wen') -> ModelFit:
+def fit_model(
+    recordings: Sequence[HysteresisRecording], seed: int = 0, model: str = 'bouc_wen'
+) -> ModelFit:
     """Fit a hysteresis model to one or more recordings (rad) of the same tube or class.
 
     What comes out is safe by construction: the boxes are those of the parameter classes, and where
@@ -177,7 +179,9 @@ def fit_model(recordings: Sequence[Recording], seed: int = 0, model: str = 'bouc
     return ModelFit(parameters, float(np.sqrt(spread)), model, offset)
 
 
-def _linear_part(recordings: Sequence[Recording], memories: Sequence[Array]) -> tuple[Array, float]:
+def _linear_part(
+    recordings: Sequence[HysteresisRecording], memories: Sequence[Array]
+) -> tuple[Array, float]:
     """Best gain and lag, and the mean square that they leave."""
     columns = [np.stack([r.driver, -y], axis=1) for r, y in zip(recordings, memories, strict=True)]
     target = np.concatenate([r.centred(r.actual) for r in recordings])
@@ -193,7 +197,7 @@ def _linear_part(recordings: Sequence[Recording], memories: Sequence[Array]) -> 
     return solution, float(np.mean((target - matrix @ solution) ** 2))
 
 
-def _check(recordings: Sequence[Recording]) -> None:
+def _check(recordings: Sequence[HysteresisRecording]) -> None:
     if not recordings:
         raise InputError('there is no recording to identify from')
     for k, recording in enumerate(recordings):

@@ -33,7 +33,7 @@ _NOTHING = 1e-9
 
 
 @dataclass(frozen=True)
-class Block:
+class ResidualBlock:
     """Residuals of C channels over a block, as products with the derivatives by D directions."""
 
     information: Array  # (C, D, D)
@@ -103,7 +103,7 @@ class JumpTest:
         self._walk = np.diag(drift**2)
         self._square = GUESSED * noise**2
         self._blocks = np.full(len(noise), GUESSED)
-        self._recent: deque[Block] = deque()
+        self._recent: deque[ResidualBlock] = deque()
         # Sums over all blocks until each of the recent ones.
         self._sums: deque[Array] = deque([np.zeros(1)], int(windows[-1]) + 1)
         self.learnt = 0  # blocks that have entered the estimate
@@ -120,7 +120,7 @@ class JumpTest:
         self._sums.clear()
         self._sums.append(np.zeros(1))
 
-    def add(self, block: Block) -> Jumps | None:
+    def add(self, block: ResidualBlock) -> Jumps | None:
         """Judge a block and those before; None until there are as many as the longest window."""
         self._recent.append(block)
         self._sums.append(self._sums[-1] + block.flat())
@@ -134,7 +134,7 @@ class JumpTest:
     def _weights(self) -> Array:
         return self._blocks / (TOGETHER * self._square)
 
-    def _learn(self, block: Block) -> None:
+    def _learn(self, block: ResidualBlock) -> None:
         seen, count = block.count > 0, np.maximum(block.count, 1.0)
         left = block.left(self._estimate) / count
         # What the estimate's uncertainty leaves is no noise: it would hide jumps.
@@ -155,7 +155,7 @@ class JumpTest:
     def _judged(self) -> Jumps:
         w, along = self._weights(), self._along.T
         now = self._sums[-1]
-        by_channel, score, square, count = Block.split(
+        by_channel, score, square, count = ResidualBlock.split(
             np.stack([now - self._sums[-1 - length] for length in self._windows]), *self._shape
         )
         by_channel = w[:, None, None] * by_channel

@@ -30,7 +30,7 @@ from endoscope_core.physics.packing import pack, rest_state
 from endoscope_core.physics.servo import turn_motor
 from endoscope_core.physics.sheath import TABLE_ROWS
 
-TICK_S = 5e-3
+JOINT_TICK_S = 5e-3
 SERVO_TICK_S = 1e-3
 READINGS = ('tension_pos', 'tension_neg', 'effort', 'bending')
 """Behind the motor."""
@@ -97,14 +97,14 @@ class PredictionBank:
         self._behind, self._servos = [], []
         for j, name in enumerate(plant.joint_names()):
             behind = [plant] * len(SLIPS) + [d.changed(plant, name) for d in SIMULATED]
-            self._behind.append(_Copies(behind, j, TICK_S))
+            self._behind.append(_Copies(behind, j, JOINT_TICK_S))
             servos = [plant, *(d.changed(plant, name) for d in SERVO)]
             self._servos.append(_Copies(servos, j, SERVO_TICK_S))
         self.rest(np.zeros(len(self._behind)))
 
     def rest(self, shaft: NDArray[np.float64]) -> None:
         """Begin from rest at shaft angles (J,) in rad."""
-        self._nominal = rest_state(self._parameters, self._on, TICK_S, shaft)
+        self._nominal = rest_state(self._parameters, self._on, JOINT_TICK_S, shaft)
         for j, copies in enumerate(self._behind):
             copies.rest(float(shaft[j]))
             for k, (slip, wires) in enumerate(zip(SLIPS, SLIPPED, strict=True)):
@@ -114,7 +114,7 @@ class PredictionBank:
             self._servos[j].rest(float(shaft[j]))
 
     def behind_motors(self, shaft: Array) -> Array:
-        """Readings behind the motors at measured shaft angles (N, J) in rad, every `TICK_S`.
+        """Readings behind the motors at measured shaft angles (N, J) in rad, every `JOINT_TICK_S`.
 
         (J, N + 1, 4, 1 + D): `READINGS` (N, N, N m, rad) as predicted, then their derivatives by a
         step of each direction. Row k is before angle k is reached.
@@ -124,13 +124,13 @@ class PredictionBank:
         inputs[:, :, layout.IN_MOTOR] = shaft.T
         out = np.empty((joints, ticks + 1, layout.OUTPUTS))
         # Leaves each joint's angle in the other's input.
-        run_joints(*self._nominal, self._parameters, self._on, inputs, True, TICK_S, out)
+        run_joints(*self._nominal, self._parameters, self._on, inputs, True, JOINT_TICK_S, out)
         result = np.zeros((joints, ticks + 1, len(READINGS), 1 + len(DIRECTIONS)))
         for j, copies in enumerate(self._behind):
             count = len(copies.states)
             varied = np.empty((count, ticks + 1, layout.OUTPUTS))
             own = np.repeat(inputs[j : j + 1], count, axis=0)
-            run_joints(*copies.arrays, own, False, TICK_S, varied)
+            run_joints(*copies.arrays, own, False, JOINT_TICK_S, varied)
             nominal, at = out[j][:, _OUT], result[j]
             at[:, :, 0] = nominal
             at[:, :, _COPIES] = np.moveaxis(varied[:, :, _OUT] - nominal, 0, -1)

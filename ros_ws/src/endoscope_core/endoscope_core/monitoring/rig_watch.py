@@ -8,16 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.monitoring.criteria import THRESHOLDS
-from endoscope_core.monitoring.jump_test import Block, Jumps, JumpTest
+from endoscope_core.monitoring.jump_test import Jumps, JumpTest, ResidualBlock
 from endoscope_core.monitoring.prediction import (
+    JOINT_TICK_S,
     SERVO_TICK_S,
-    TICK_S,
     PredictionBank,
 )
 from endoscope_core.monitoring.rig_change import CHANGES, DIRECTIONS, DRIFT_S, SMALLEST, Part
-from endoscope_core.monitoring.samples import Samples
+from endoscope_core.monitoring.thresholds import THRESHOLDS
 from endoscope_core.physics.description import PlantDescription
+from endoscope_core.signals.samples import Samples
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ _PART_OF = np.array([str(change.part) for change in CHANGES])
 
 
 @dataclass(frozen=True)
-class Alarm:
+class DetectedChange:
     """A change that was detected.
 
     Attributes
@@ -96,7 +96,7 @@ class _Joint:
         self._threshold = np.array([thresholds[part] for part in _PART_OF])
         self._times: deque[float] = deque(maxlen=int(WINDOWS[-1]))
         self._since_alarm = 0
-        self.alarm: Alarm | None = None
+        self.alarm: DetectedChange | None = None
         self.jumps: Jumps | None = None
         self.margin = 0.0
         self.moved = 0  # blocks
@@ -117,7 +117,7 @@ class _Joint:
         visited = self._high - self._low
         return way >= STILL_RAD and visited >= LEAST_RANGE_RAD and self._way > SWEEPS * visited
 
-    def add(self, begin: float, block: Block) -> None:
+    def add(self, begin: float, block: ResidualBlock) -> None:
         """Judge a block."""
         if self.alarm is not None and self.alarm.parts:
             return
@@ -134,19 +134,19 @@ class _Joint:
                 # What is judged now must not be learnt as the rig's own.
                 self.test.learning = False
                 now = begin + BLOCK_S
-                self.alarm = Alarm(self.name, now, self._began(window), self.margin)
+                self.alarm = DetectedChange(self.name, now, self._began(window), self.margin)
             return
         self._since_alarm += 1
         if self._since_alarm == NAMED_AFTER:
             self.alarm = self._named(self.alarm, self.jumps)
 
-    def _named(self, alarm: Alarm, jumps: Jumps) -> Alarm:
+    def _named(self, alarm: DetectedChange, jumps: Jumps) -> DetectedChange:
         best = {part: float(jumps.gain[:, part == _PART_OF].max()) for part in Part}
         likely = sorted(Part, key=lambda part: -best[part])
         parts = tuple(part for part in likely if best[part] >= TIE * best[likely[0]])
         of_part = np.where(parts[0] == _PART_OF, jumps.gain, -1.0)
         window, change = np.unravel_index(of_part.argmax(), of_part.shape)
-        return Alarm(
+        return DetectedChange(
             self.name,
             alarm.at,
             min(alarm.since, self._began(int(window))),
@@ -187,7 +187,7 @@ class RigWatch:
         self.restarted_because = ''
 
     @property
-    def alarms(self) -> list[Alarm]:
+    def alarms(self) -> list[DetectedChange]:
         """One alarm of each joint that has changed."""
         return [joint.alarm for joint in self.joints if joint.alarm is not None]
 
@@ -259,7 +259,9 @@ class RigWatch:
         fine: Array = begin + SERVO_TICK_S * np.arange(
             round(BLOCK_S / SERVO_TICK_S), dtype=np.float64
         )
-        grid: Array = begin + TICK_S * np.arange(round(BLOCK_S / TICK_S) + 1, dtype=np.float64)
+        grid: Array = begin + JOINT_TICK_S * np.arange(
+            round(BLOCK_S / JOINT_TICK_S) + 1, dtype=np.float64
+        )
         shaft = self.motor.between(grid)[:, :count]
         behind = self._bank.behind_motors(shaft[1:])
         motors = self._bank.motors(self.setpoint.held(fine))
@@ -286,4 +288,4 @@ class RigWatch:
                 ],
                 axis=1,
             )
-            joint.add(begin, Block.of(measured - predicted[..., 0], predicted[..., 1:]))
+            joint.add(begin, ResidualBlock.of(measured - predicted[..., 0], predicted[..., 1:]))

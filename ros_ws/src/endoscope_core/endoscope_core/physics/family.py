@@ -39,7 +39,7 @@ _DIGITS = 6
 
 
 @dataclass(frozen=True)
-class Readings:
+class ReadingErrors:
     """How the recorded rig reads its plant."""
 
     # Of each cell without tension, N.
@@ -59,7 +59,7 @@ class TubeFamily:
     # bend and with its square, counted in `SPAN` from `CENTRE`. Keys left out are nominal.
     lines: Mapping[str, tuple[float, ...]]
     friction_profile: tuple[float, ...] = ()  # of all tubes
-    readings: Readings = field(default_factory=Readings)
+    readings: ReadingErrors = field(default_factory=ReadingErrors)
     # Where the numbers are from and what they leave; carried along, not used.
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
@@ -119,7 +119,7 @@ def shipped_family() -> TubeFamily:
 class _File:
     schema: Literal[1]
     provenance: Mapping[str, Any] = field(default_factory=dict)
-    readings: Readings = field(default_factory=Readings)
+    readings: ReadingErrors = field(default_factory=ReadingErrors)
     friction_profile: tuple[Number, ...] = ()
     lines: Mapping[Literal[NOMINAL_KEYS], tuple[Number, ...]] = (  # type: ignore[valid-type]
         field(default_factory=dict)

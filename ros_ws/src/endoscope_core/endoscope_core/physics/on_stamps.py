@@ -30,7 +30,7 @@ class AnswerStamps:
 
 
 @dataclass(frozen=True)
-class Answer:
+class RigReadings:
     """Noise-free readings at the stamps asked for, for J joints."""
 
     # Of motors, (N_motor, J).
@@ -73,7 +73,7 @@ def answer_commands(
     shaft_commands: Array,
     answer_stamps: AnswerStamps,
     read_delay: float = 0.0,
-) -> Answer:
+) -> RigReadings:
     """What the noise-free sensors of a rig read at given stamps under recorded commands.
 
     The stamps are what the devices' clocks say: a plant whose tracker's clock is skewed answers
@@ -103,8 +103,8 @@ def _seconds(stamps: Stamps, origin: int) -> Array:
     return np.asarray((stamps - origin) * NANOSECONDS, dtype=np.float64)
 
 
-def _at_stamps(trajectory: PlantTrajectory, times: Mapping[str, Array]) -> Answer:
-    return Answer(
+def _at_stamps(trajectory: PlantTrajectory, times: Mapping[str, Array]) -> RigReadings:
+    return RigReadings(
         _interpolate(trajectory.shaft_position, times['motor']),
         _interpolate(trajectory.shaft_velocity, times['motor']),
         _interpolate(trajectory.shaft_effort, times['motor']),

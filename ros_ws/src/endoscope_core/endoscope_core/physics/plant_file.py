@@ -10,6 +10,7 @@ import yaml
 
 from endoscope_core.atomic_output import write_text
 from endoscope_core.errors import FileError, nearest
+from endoscope_core.names import JOINTS
 from endoscope_core.physics.description import (
     NUMBERS,
     SLAVE,
@@ -25,7 +26,6 @@ from endoscope_core.schema import Before, Number, blamed_on, load_yaml, read, wi
 
 UNKNOWN_TERM = 'unknown_term'
 """Id of what is added to the plant and is no effect of the catalogue."""
-JOINT_NAMES = ('bend_x', 'bend_y')
 
 
 def _as_in_file(kind: type[JointParameters] | type[SensorParameters]) -> Any:
@@ -89,8 +89,8 @@ class _Term:
 
 @dataclass(frozen=True)
 class _Plant:
-    joints: Mapping[Literal[JOINT_NAMES], _Joint] = field(  # type: ignore[valid-type]
-        default_factory=lambda: dict.fromkeys(JOINT_NAMES, _Joint())
+    joints: Mapping[Literal[JOINTS], _Joint] = field(  # type: ignore[valid-type]
+        default_factory=lambda: dict.fromkeys(JOINTS, _Joint())
     )
     sensors: _Sensors = field(default_factory=_Sensors)  # type: ignore[valid-type]
     effects: Annotated[tuple[Any, ...], Before(lambda given: given or ())] = ()
@@ -126,7 +126,7 @@ def plant_from_mapping(content: Any, where: str = 'the plant') -> PlantDescripti
     plant = PlantDescription(
         {
             name: JointParameters(**vars(given.joints[name]))
-            for name in JOINT_NAMES
+            for name in JOINTS
             if name in given.joints
         },
         SensorParameters(**vars(given.sensors)),
@@ -206,7 +206,7 @@ def nominal_plant_text() -> str:
         f'# joint_friction of {left_out.joint_friction:g}, and a section_friction of none.',
         'joints:',
     ]
-    for name in JOINT_NAMES:
+    for name in JOINTS:
         lines += [f'  {name}:', *_commented(asdict(SLAVE), 4)]
     lines += ['sensors:', *_commented(asdict(SensorParameters()), 2)]
     lines += [

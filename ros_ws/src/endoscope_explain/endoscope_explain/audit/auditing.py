@@ -20,7 +20,7 @@ from endoscope_explain.audit.findings import (
     stamp_unit,
     stray_poses,
 )
-from endoscope_explain.recording import Recording
+from endoscope_explain.recording import RigRecording
 
 
 class Step(Protocol):
@@ -52,7 +52,7 @@ KINDS = tuple(
 """Of all findings."""
 
 
-def audit_recording(recording: Recording, plant: PlantDescription) -> AuditReport:
+def audit_recording(recording: RigRecording, plant: PlantDescription) -> AuditReport:
     """Find what is wrong with a recording, and correct it to what it must mean where it can be."""
     seen = Examined(recording, recording, plant.of_joints(recording.joints))
     for step in STEPS:

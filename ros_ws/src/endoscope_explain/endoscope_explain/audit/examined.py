@@ -7,15 +7,15 @@ from typing import Any
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit.finding import Finding
 from endoscope_explain.audit.plausibility import Comparison
-from endoscope_explain.recording import Array, Mask, Recording
+from endoscope_explain.recording import Array, Mask, RigRecording
 
 
 @dataclass(frozen=True)
 class Examined:
     """What a step of the audit takes and gives: each finds something and puts it right."""
 
-    recorded: Recording  # as it came
-    recording: Recording  # as put right so far
+    recorded: RigRecording  # as it came
+    recording: RigRecording  # as put right so far
     plant: PlantDescription  # of the recorded joints
     findings: tuple[Finding, ...] = ()
     comparison: Comparison | None = None  # with the plant, of what is long enough
@@ -30,7 +30,7 @@ class Examined:
         return replace(self, findings=(*self.findings, *findings), **changed)
 
 
-def without_times(recording: Recording, wrong: Callable[[Array], Mask]) -> Recording:
+def without_times(recording: RigRecording, wrong: Callable[[Array], Mask]) -> RigRecording:
     """The recording with no sample valid at wrong times, of (N,) in s, of all or each joint."""
     return recording.with_series(
         {

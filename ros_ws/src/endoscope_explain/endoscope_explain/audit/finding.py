@@ -6,10 +6,10 @@ from enum import StrEnum
 from typing import Any
 
 from endoscope_explain.explanation import Estimate
-from endoscope_explain.recording import DESIRED, Recording, motor_name, signal_name
+from endoscope_explain.recording import DESIRED, RigRecording, motor_name, signal_name
 
 Column = tuple[str, int]
-"""A series of a `Recording`, and which of its columns, counted over all joints and wires."""
+"""A series of a `RigRecording`, and which of its columns, counted over all joints and wires."""
 
 
 class Severity(StrEnum):
@@ -50,7 +50,7 @@ class FindingKind:
 
     def found(
         self,
-        recording: Recording,
+        recording: RigRecording,
         signals: Sequence[str | Column],
         intervals: Sequence[tuple[float, float]] = (),
         *,
@@ -79,7 +79,7 @@ class FindingKind:
         )
 
 
-def column_name(recording: Recording, column: Column) -> str:
+def column_name(recording: RigRecording, column: Column) -> str:
     """The name of a column of a measured quantity or of the command."""
     quantity, place = column
     joint = _joint_of(recording, column)
@@ -89,7 +89,7 @@ def column_name(recording: Recording, column: Column) -> str:
     return signal_name(quantity, joint, place % 2 if quantity == 'tension' else 0)
 
 
-def _joint_of(recording: Recording, column: Column) -> str:
+def _joint_of(recording: RigRecording, column: Column) -> str:
     quantity, place = column
     return recording.joints[place // 2 if quantity == 'tension' else place]
 
@@ -99,7 +99,7 @@ class AuditReport:
     """A recording made fit for analysis, and what had to be done to it."""
 
     # As corrected, with strictly increasing stamps; samples that must not be judged are not valid.
-    recording: Recording
+    recording: RigRecording
     findings: tuple[Finding, ...]  # most serious first
 
     def faults(self) -> tuple[Finding, ...]:

@@ -35,7 +35,7 @@ from endoscope_explain.audit.misreading import (
     misreadings,
     scaled,
 )
-from endoscope_explain.recording import MOVES_RAD, Array, Recording, Series
+from endoscope_explain.recording import MOVES_RAD, Array, RigRecording, Series
 
 MOST = 1.0
 """Misfit of what has nothing in common."""
@@ -76,7 +76,7 @@ class Comparison:
     """A recording with ordered stamps beside what the described plant makes of its command."""
 
     def __init__(
-        self, recording: Recording, plant: PlantDescription, leave_out: Collection[str] = ()
+        self, recording: RigRecording, plant: PlantDescription, leave_out: Collection[str] = ()
     ) -> None:
         self._plant, self._rig = plant, recording.rig
         begin, end = _span(recording)
@@ -236,7 +236,7 @@ def _of_any_size(quantity: str, moments: Moments) -> Iterator[Misreading]:
             yield scaled(quantity, 'factor', factor, part, columns, ways * many)
 
 
-def as_meant(recording: Recording, mistakes: Collection[Misreading]) -> Recording:
+def as_meant(recording: RigRecording, mistakes: Collection[Misreading]) -> RigRecording:
     """Return the recording with its columns in the units, signs and order that fit."""
     changed = {}
     every = {'command': recording.command, **recording.measured()}
@@ -253,7 +253,7 @@ def as_meant(recording: Recording, mistakes: Collection[Misreading]) -> Recordin
     return recording.with_series(changed)
 
 
-def _span(recording: Recording) -> tuple[float, float]:
+def _span(recording: RigRecording) -> tuple[float, float]:
     """From shortly before the first motion, no longer than is needed."""
     command = recording.command
     away = np.abs(command.values - command.values[0]).max(axis=1) >= MOVES_RAD

@@ -16,7 +16,7 @@ from endoscope_explain.fit.evidence import log_evidence
 from endoscope_explain.fit.model import packed_joint
 from endoscope_explain.fit.nominal import nominal_references
 from endoscope_explain.observe.observation import observe
-from endoscope_explain.recording import MOVES_RAD, Recording, Series
+from endoscope_explain.recording import MOVES_RAD, RigRecording, Series
 
 SLOW_S = 2.0 * TICK
 """Time from one command to the next, in the middle, from which on it may have moved between."""
@@ -24,7 +24,7 @@ GAP = 5.0
 """Times as long a pause is one in which the command was held."""
 
 
-def with_command_between_rows(recording: Recording, plant: PlantDescription) -> Recording:
+def with_command_between_rows(recording: RigRecording, plant: PlantDescription) -> RigRecording:
     """The recording with its command straight between rows, where the rig follows that better.
 
     The nominal plant is refitted to both, and their evidence decides.
@@ -55,7 +55,7 @@ def _straight(command: Series, gap: float) -> Series:
     return Series.of(command.topic, np.asarray(time, np.float64), values)
 
 
-def _evidence(recording: Recording, plant: PlantDescription) -> float:
+def _evidence(recording: RigRecording, plant: PlantDescription) -> float:
     """Logarithm of the evidence of the nominal plant, refitted."""
     with threadpool_limits(1, 'blas'):
         seen = [each for each in observe(recording, plant) if each.channels]

@@ -12,6 +12,7 @@ from endoscope_core.physics.effects import describe, lacking
 from endoscope_core.physics.functions.places import HIGH, LAG, Place
 from endoscope_core.physics.layout import FRICTION_PROFILE, NOMINAL_KEYS
 from endoscope_explain.explanation import NINETY_PERCENT
+from endoscope_explain.options import BAND
 
 LEAD = -1
 """Index that stands for the reading's lead, which is not a parameter of the plant."""
@@ -33,8 +34,6 @@ SCATTERED = {
 """Places of the numbers that scatter from one healthy rig to the next: of what form it is, where
 its joint rests, how its radii were machined."""
 FITTED_NOMINAL = (*SCALED_NOMINAL, *SCATTERED)
-BAND = 0.15
-"""Relative tolerance by which a healthy rig differs from its description."""
 BAND_SPREAD = 0.09
 
 

@@ -16,12 +16,7 @@ from endoscope_core.physics.layout import OUT_JOINT
 from endoscope_core.workers import parallel_map
 from endoscope_explain.audit.misreading import OTHER_RIGS
 from endoscope_explain.fit.evidence import is_noise
-from endoscope_explain.fit.free_parameters import (
-    BAND,
-    SCALED_NOMINAL,
-    FreeParameter,
-    nominal_parameters,
-)
+from endoscope_explain.fit.free_parameters import SCALED_NOMINAL, FreeParameter, nominal_parameters
 from endoscope_explain.fit.model import (
     TO_THE_END,
     Fit,
@@ -33,7 +28,8 @@ from endoscope_explain.fit.model import (
 )
 from endoscope_explain.observe.observation import Channel, JointObservation, StampsOnTicks
 from endoscope_explain.observe.predicted_signals import view
-from endoscope_explain.recording import Recording, signal_name
+from endoscope_explain.options import BAND
+from endoscope_explain.recording import RigRecording, signal_name
 
 Array = NDArray[np.float64]
 
@@ -50,7 +46,7 @@ SAME_STAMP_S = 1e-6
 
 
 def without_isolated(
-    recording: Recording, observations: tuple[JointObservation, ...], fits: tuple[Fit, ...]
+    recording: RigRecording, observations: tuple[JointObservation, ...], fits: tuple[Fit, ...]
 ) -> tuple[JointObservation, ...]:
     """Leave out tracker samples that stick out of the residual; the same tuple where none does."""
     # Where the audit found no wrong sample, none is left out here: a spike may be physics.
@@ -72,7 +68,7 @@ def _without_isolated(observation: JointObservation, fit: Fit) -> JointObservati
     return replace(observation, channels=channels)
 
 
-def with_isolated_marked(recording: Recording, plant: PlantDescription) -> Recording:
+def with_isolated_marked(recording: RigRecording, plant: PlantDescription) -> RigRecording:
     """Mark tracker samples that stick out of what a plant predicts as wrong, if others were."""
     bending = recording.bending
     if bending.valid.all():
@@ -173,7 +169,7 @@ AT_THE_END = 1e-3
 
 
 def with_references(
-    recording: Recording,
+    recording: RigRecording,
     observations: tuple[JointObservation, ...],
     plant: PlantDescription,
     band: float,

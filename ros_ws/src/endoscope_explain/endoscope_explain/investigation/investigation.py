@@ -9,17 +9,18 @@ from pathlib import Path
 from endoscope_core.atomic_output import write_text
 from endoscope_core.errors import NotPlayedError, RigStoppedError
 from endoscope_core.investigation_folder import PAGE
+from endoscope_core.names import JOINTS
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.plant_file import load_plant, save_plant
 from endoscope_core.rig import Rig
-from endoscope_core.signals.command_file import JOINTS, write_command_file
-from endoscope_explain.case import ExplainedCase
+from endoscope_core.signals.command_file import write_command_file
+from endoscope_explain.case import ExplainedCase, Sources
 from endoscope_explain.design import is_wide, propose, what_is_asked
 from endoscope_explain.explanation import NamedEffect, Verdict
 from endoscope_explain.investigation import log as logs
-from endoscope_explain.investigation.log import Answer, Log, Name, Round, Stop
+from endoscope_explain.investigation.log import Log, Name, RigAnswer, Round, Stop
 from endoscope_explain.investigation.motions import (
-    Motion,
+    RigMotion,
     commissioning,
     of_experiment,
     require_allowed,
@@ -27,7 +28,7 @@ from endoscope_explain.investigation.motions import (
 from endoscope_explain.investigation.tracking import PlayThrough, held_out, with_tracking
 from endoscope_explain.open_questions import open_questions
 from endoscope_explain.operator_changes import what_would_decide
-from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
+from endoscope_explain.pipeline import Progress, explain_case, read_inputs
 from endoscope_explain.prediction_set import OTHER_NUMBERS, Posterior
 from endoscope_explain.report.left_open import in_words
 from endoscope_explain.report.numbers import shown
@@ -36,7 +37,7 @@ from endoscope_explain.takes import inputs_joined
 
 EXPERIMENTS = 4
 
-Play = Callable[[Motion, Path, Path], None]
+Play = Callable[[RigMotion, Path, Path], None]
 """Plays a motion, which a file holds, and records it to a bag."""
 Known = Mapping[str, Collection[str]]
 """By joint, names that were given or left open before."""
@@ -68,11 +69,10 @@ def explain_together(
     progress: Progress | None = None,
 ) -> ExplainedCase:
     """Explain bags of one rig as one recording; BagError if one cannot be used."""
-    plant, file = investigation.plant, investigation.plant_file
-    inputs = [
-        read_inputs(Sources(bag, plant, quick=True, plant_file=file, known=known)) for bag in bags
-    ]
-    return explain_case(inputs_joined(inputs), jobs=investigation.jobs, progress=progress)
+    plant, file, jobs = investigation.plant, investigation.plant_file, investigation.jobs
+    first = Sources(bags[0], plant, quick=True, jobs=jobs, plant_file=file, known=known)
+    inputs = [read_inputs(replace(first, bag=bag)) for bag in bags]
+    return explain_case(inputs_joined(inputs), progress=progress)
 
 
 def investigate(
@@ -137,7 +137,7 @@ class _Running:
         if self.page is not None:
             write_text(self.of.folder / PAGE, self.page(log))
 
-    def record(self, motion: Motion, play: Play) -> None:
+    def record(self, motion: RigMotion, play: Play) -> None:
         """Have a motion played and recorded."""
         require_allowed(motion, self.of.rig)
         number = len(self.log.rounds) + 1
@@ -158,7 +158,7 @@ class _Running:
         play(motion, file, self.of.folder / asked.bag)
         self.keep(self.log.with_last(recorded=True, played_s=time.monotonic() - began))
 
-    def answered(self, explain: Explain) -> Motion | Stop:
+    def answered(self, explain: Explain) -> RigMotion | Stop:
         """Explain all recordings together, and work out what to ask next, or why nothing."""
         began = time.monotonic()
         whole = self.log.whole
@@ -222,7 +222,7 @@ class _Running:
             self.report(line)
 
 
-def answer_of(case: ExplainedCase, seconds: float) -> Answer:
+def answer_of(case: ExplainedCase, seconds: float) -> RigAnswer:
     """What all recordings show together."""
     fit = case.explanation.fit
     worst = [
@@ -239,7 +239,7 @@ def answer_of(case: ExplainedCase, seconds: float) -> Answer:
     ]
     sentence = verdict_sentence(case)
     places = tuple(where(place) for place in case.places)
-    return Answer(str(case.verdict), sentence, tuple(names), worst[0], worst[1], seconds, places)
+    return RigAnswer(str(case.verdict), sentence, tuple(names), worst[0], worst[1], seconds, places)
 
 
 def _open(left: Posterior) -> str:

@@ -56,7 +56,7 @@ class Name:
 
 
 @dataclass(frozen=True)
-class Answer:
+class RigAnswer:
     """What all recordings so far show together."""
 
     verdict: str
@@ -82,7 +82,7 @@ class Round:
     bag: str  # its folder, in the folder
     recorded: bool = False  # whole, from begin to end
     ended: str = ''  # why it is not whole
-    answer: Answer | None = None
+    answer: RigAnswer | None = None
     # Until the motion was recorded, consent included, and then to find the next one.
     played_s: float = 0.0
     proposed_s: float = 0.0
@@ -116,7 +116,7 @@ class Log:
         return tuple(each for each in self.rounds if each.recorded)
 
     @property
-    def last_answer(self) -> Answer | None:
+    def last_answer(self) -> RigAnswer | None:
         """What is known now."""
         answers = [each.answer for each in self.rounds if each.answer is not None]
         return answers[-1] if answers else None
@@ -281,7 +281,7 @@ def recorded(each: Round) -> str:
     return 'Not recorded yet.'
 
 
-def answered(answer: Answer) -> Sequence[str]:
+def answered(answer: RigAnswer) -> Sequence[str]:
     """What is known after a round, in sentences."""
     lines = [answer.sentence]
     for name in answer.names:

@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.errors import InputError
+from endoscope_core.names import JOINTS
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.rig import Rig
 from endoscope_core.signals import Signal, hold, sequence
-from endoscope_core.signals.command_file import JOINTS, CommandTable
+from endoscope_core.signals.command_file import CommandTable
 from endoscope_core.signals.motions import (
     again_with_hold,
     chirp,
@@ -37,7 +38,7 @@ class MotionRefusedError(InputError):
 
 
 @dataclass(frozen=True)
-class Motion:
+class RigMotion:
     """A motion that a rig is asked to make."""
 
     waveform: str
@@ -81,7 +82,7 @@ def first_motion() -> dict[str, Signal]:
     return {'bend_x': sequence(COMMISSIONING, x), 'bend_y': sequence(COMMISSIONING, y)}
 
 
-def commissioning(plant: PlantDescription, rig: Rig) -> Motion:
+def commissioning(plant: PlantDescription, rig: Rig) -> RigMotion:
     """The commissioning motion as large as the rig's limits and the described plant allow.
 
     MotionRefusedError if the described plant answers it beyond them at any size.
@@ -105,20 +106,20 @@ def commissioning(plant: PlantDescription, rig: Rig) -> Motion:
         if is_safe(answer, ceiling, math.inf):
             why = 'Nothing is known of the rig yet but its description.'
             table = CommandTable(JOINTS, ticks, angle)
-            return Motion(COMMISSIONING, ' and '.join(here), why, table)
+            return RigMotion(COMMISSIONING, ' and '.join(here), why, table)
     raise MotionRefusedError(
         f'the commissioning motion is refused: the described plant answers {SHARES[-1]:.0%} of it '
         f'with more than {ceiling:g} N, tension.calibration_ceiling of rig.yaml'
     )
 
 
-def of_experiment(experiment: NextExperiment) -> Motion:
+def of_experiment(experiment: NextExperiment) -> RigMotion:
     """The motion of an experiment."""
     table = CommandTable(experiment.joints, np.array(experiment.time), np.array(experiment.command))
-    return Motion(experiment.waveform, experiment.joint, experiment.why, table)
+    return RigMotion(experiment.waveform, experiment.joint, experiment.why, table)
 
 
-def require_allowed(motion: Motion, rig: Rig) -> None:
+def require_allowed(motion: RigMotion, rig: Rig) -> None:
     """Raise MotionRefusedError of a motion beyond a rig's limits of angle, speed, acceleration."""
     facts, table = rig.joints, motion.table
     speed = np.diff(table.angle, axis=0) / np.diff(table.time)[:, None]

@@ -11,19 +11,15 @@ from numpy.typing import NDArray
 from endoscope_bags import open_bag
 from endoscope_core.errors import NotPlayedError
 from endoscope_core.metrics import tracking_rmse
+from endoscope_core.names import JOINTS
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.rig import Rig
 from endoscope_core.signals import move, non_periodic_signal, sequence
-from endoscope_core.signals.command_file import (
-    JOINTS,
-    CommandTable,
-    read_command_file,
-    write_command_file,
-)
+from endoscope_core.signals.command_file import CommandTable, read_command_file, write_command_file
 from endoscope_explain.experiment_motions import SAMPLE_S, as_played
 from endoscope_explain.investigation import log as logs
 from endoscope_explain.investigation.log import Log, Tracking
-from endoscope_explain.investigation.motions import Motion, commissioning, require_allowed
+from endoscope_explain.investigation.motions import RigMotion, commissioning, require_allowed
 from endoscope_explain.recording import BENDING, DESIRED
 
 Array = NDArray[np.float64]
@@ -38,7 +34,7 @@ SHARE = 0.5
 """Of the largest angle of the commissioning motion: what compensation adds to it stays within what
 the rig has been through."""
 
-PlayThrough = Callable[[Motion, Path, Path, Path], None]
+PlayThrough = Callable[[RigMotion, Path, Path, Path], None]
 """Plays a motion, which a file holds, to a bag, through the inverse of the plant of another."""
 
 
@@ -56,7 +52,7 @@ class Tracked:
         return tracking_rmse(self.desired, self.tip)
 
 
-def held_out(plant: PlantDescription, rig: Rig) -> Motion:
+def held_out(plant: PlantDescription, rig: Rig) -> RigMotion:
     """A motion of both joints that is among no experiments."""
     first = commissioning(plant, rig)
     signal = non_periodic_signal(DURATION_S)
@@ -71,11 +67,11 @@ def held_out(plant: PlantDescription, rig: Rig) -> Motion:
     columns = [angle if joint in plant.joints else 0.0 * angle for joint in JOINTS]
     table = CommandTable(JOINTS, *as_played(time, np.stack(columns, axis=1), rig))
     why = 'It is among no experiments: it shows what the improved plant is good for.'
-    return Motion(HELD_OUT, first.joint, why, table)
+    return RigMotion(HELD_OUT, first.joint, why, table)
 
 
 def with_tracking(
-    log: Log, folder: Path, plant_file: Path, motion: Motion, rig: Rig, play: PlayThrough
+    log: Log, folder: Path, plant_file: Path, motion: RigMotion, rig: Rig, play: PlayThrough
 ) -> Log:
     """The log with how the tip follows a motion by the described and by the improved plant.
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_explain.locate.excess import WINDOW_S, SignalExcess
-from endoscope_explain.recording import Recording
+from endoscope_explain.recording import RigRecording
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -17,7 +17,7 @@ AFTER_REVERSAL_RAD = 0.15
 STANDING_RAD_PER_S = 0.02
 
 
-def conditions(recording: Recording, j: int) -> dict[str, Mask]:
+def conditions(recording: RigRecording, j: int) -> dict[str, Mask]:
     """When joint `j` was in each state (N,), by the state's words as they stand after "shows"."""
     # On a grid of `GRID_S`, those states that hold for some, not all of the time.
     grid = np.arange(0.0, recording.duration, GRID_S)
@@ -61,7 +61,7 @@ def conditions(recording: Recording, j: int) -> dict[str, Mask]:
     return {words: active for words, active in found.items() if 0.02 < active.mean() < 0.98}
 
 
-def drive(recording: Recording, j: int, end: float) -> Array:
+def drive(recording: RigRecording, j: int, end: float) -> Array:
     """Largest motor angle and speed, joint-equivalent, and bending angle in windows (W, 3)."""
     count = int(np.ceil(end / WINDOW_S))
     grid = (np.arange(count * int(WINDOW_S / GRID_S), dtype=np.float64) + 0.5) * GRID_S
@@ -71,7 +71,7 @@ def drive(recording: Recording, j: int, end: float) -> Array:
     return np.asarray(every.max(axis=1))
 
 
-def _motor(recording: Recording, j: int, grid: Array) -> Array:
+def _motor(recording: RigRecording, j: int, grid: Array) -> Array:
     source = recording.shaft_position or recording.command
     return np.interp(grid, source.time, source.values[:, j]) / recording.gear
 

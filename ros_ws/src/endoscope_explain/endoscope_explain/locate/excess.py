@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.observe.predicted_signals import SignalView, view
-from endoscope_explain.recording import Recording
+from endoscope_explain.recording import RigRecording
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ class SignalExcess:
 
 
 def excess_between(
-    recording: Recording, without: PlantDescription, with_it: PlantDescription | None
+    recording: RigRecording, without: PlantDescription, with_it: PlantDescription | None
 ) -> list[SignalExcess]:
     """What two plants, or one plant and noise alone, miss of each signal, largest excess first."""
     plants = {'without': without} if with_it is None else {'without': without, 'with': with_it}

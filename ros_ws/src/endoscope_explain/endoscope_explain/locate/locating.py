@@ -13,7 +13,7 @@ from endoscope_core.physics.layout import IN_MOTOR
 from endoscope_core.physics.packing import without_functions
 from endoscope_core.physics.simulator import TICK
 from endoscope_explain.audit import Finding
-from endoscope_explain.case import ChainCut, Place, changed_parameters
+from endoscope_explain.case import ChainCut, Mismatch, changed_parameters
 from endoscope_explain.explanation import Explanation, NamedEffect
 from endoscope_explain.fit.free_parameters import nominal_number
 from endoscope_explain.fit.model import simulate_joint
@@ -21,7 +21,7 @@ from endoscope_explain.locate.conditions import conditions, drive, regime_in_wor
 from endoscope_explain.locate.excess import SignalExcess, excess_between, intervals, onset, shares
 from endoscope_explain.observe.observation import JointObservation, observe
 from endoscope_explain.observe.predicted_signals import packed_rig, reading_lead, simulate_rig
-from endoscope_explain.recording import Recording
+from endoscope_explain.recording import RigRecording
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ OF_THE_MOTOR = {'shaft_position', 'shaft_velocity'}
 """Its effort is what the wires pull by."""
 
 
-def cut_at_motor(recording: Recording, plant: PlantDescription) -> tuple[ChainCut, ...]:
+def cut_at_motor(recording: RigRecording, plant: PlantDescription) -> tuple[ChainCut, ...]:
     """Compare both ways to drive wires and joint by a plain plant; none without shaft reading."""
     shaft = recording.shaft_position
     if shaft is None:
@@ -89,8 +89,8 @@ def band_hz(excess: SignalExcess) -> tuple[float, float]:
 
 
 def locate_effects(
-    recording: Recording, plant: PlantDescription, effects: Sequence[NamedEffect]
-) -> list[Place]:
+    recording: RigRecording, plant: PlantDescription, effects: Sequence[NamedEffect]
+) -> list[Mismatch]:
     """Say where each effect of an explained recording shows, but for those that the plant lacks."""
     # The plant with all effects is compared with the same plant without the one in question: what
     # the measurement then has in excess is that effect's trace.
@@ -114,7 +114,7 @@ def _without(plant: PlantDescription, effect: NamedEffect) -> PlantDescription:
     return without_functions(plant, effect.joint, describe(effect.id).traits.families)
 
 
-def locate_unknown(recording: Recording, explanation: Explanation) -> list[Place]:
+def locate_unknown(recording: RigRecording, explanation: Explanation) -> list[Mismatch]:
     """Say where a mismatch shows that no effect of the catalogue explains."""
     term = explanation.unknown
     found = excess_between(recording, explanation.refitted, None)
@@ -138,7 +138,7 @@ def _shows_in(found: Sequence[SignalExcess]) -> str:
     return 'joint' if len(behind) == 2 else 'sensing'
 
 
-def locate_parameters(recording: Recording, explanation: Explanation) -> list[Place]:
+def locate_parameters(recording: RigRecording, explanation: Explanation) -> list[Mismatch]:
     """Say where parameters that changed show, stage by stage."""
     found = excess_between(recording, explanation.nominal, explanation.refitted)
     stages = dict.fromkeys(
@@ -149,20 +149,21 @@ def locate_parameters(recording: Recording, explanation: Explanation) -> list[Pl
     return [place(recording, found, stage, joint) for stage, joint in stages]
 
 
-def locate_findings(findings: Sequence[Finding]) -> list[Place]:
+def locate_findings(findings: Sequence[Finding]) -> list[Mismatch]:
     """Say where what the audit found is."""
     return [
-        Place(f.stage, f.joint, f.signals, f.intervals[:12], f.text, (0.0, 0.0)) for f in findings
+        Mismatch(f.stage, f.joint, f.signals, f.intervals[:12], f.text, (0.0, 0.0))
+        for f in findings
     ]
 
 
 def place(
-    recording: Recording,
+    recording: RigRecording,
     found: Sequence[SignalExcess],
     stage: str,
     joint: str,
     began: float | None = None,
-) -> Place:
+) -> Mismatch:
     """Describe one trace in signals, time, state and frequency; `found` is of both joints."""
     by_signal = shares(found)
     j = recording.joints.index(joint)
@@ -174,7 +175,7 @@ def place(
     if began is not None:
         rest = '' if regime == 'throughout' or regime.startswith('after') else f', {regime}'
         regime = f'from {began:.1f} s on{rest}'
-    return Place(
+    return Mismatch(
         stage,
         joint,
         tuple(by_signal) or (telling[0].view.signal,),

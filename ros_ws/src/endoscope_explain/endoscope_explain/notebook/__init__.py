@@ -3,12 +3,12 @@
 from endoscope_core.errors import EndoscopeError
 from endoscope_explain.notebook.arrays import from_arrays
 from endoscope_explain.notebook.calls import Explained, explain, simulate
-from endoscope_explain.notebook.signals import Signal, Signals, read
+from endoscope_explain.notebook.signals import RecordedSignal, Signals, read
 
 __all__ = [
     'EndoscopeError',
     'Explained',
-    'Signal',
+    'RecordedSignal',
     'Signals',
     'explain',
     'from_arrays',

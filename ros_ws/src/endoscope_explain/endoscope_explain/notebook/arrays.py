@@ -12,9 +12,9 @@ from endoscope_bags import BagWriter, MessageStream
 from endoscope_bags.cdr_encoding import encode_joint_states
 from endoscope_bags.message_types import JOINT_STATE
 from endoscope_core.errors import InputError, nearest
-from endoscope_core.physics.plant_file import JOINT_NAMES
+from endoscope_core.names import JOINTS
 from endoscope_explain.notebook.arguments import SCRATCH, checked
-from endoscope_explain.notebook.signals import UNITS, Array, Signal, Signals, name_of, read
+from endoscope_explain.notebook.signals import UNITS, Array, RecordedSignal, Signals, name_of, read
 from endoscope_explain.recording import (
     BENDING,
     COMMAND,
@@ -32,7 +32,7 @@ LATEST_S = 2.0**31
 
 @checked
 def from_arrays(
-    signals: Mapping[str, Signal | tuple[ArrayLike, ArrayLike]],
+    signals: Mapping[str, RecordedSignal | tuple[ArrayLike, ArrayLike]],
     *,
     out: str | Path | None = None,
 ) -> Signals:
@@ -64,7 +64,7 @@ def from_arrays(
         if name not in known:
             raise InputError(f'{name} is not a signal: {nearest(name, known)}')
         topic, of, quantity = known[name]
-        pair = (given.time, given.values) if isinstance(given, Signal) else given
+        pair = (given.time, given.values) if isinstance(given, RecordedSignal) else given
         time, values = _checked(name, pair)
         first, shared = times.setdefault(topic, (name, time))
         if not np.array_equal(shared, time):
@@ -95,7 +95,7 @@ def commands_from(commands: Mapping[str, ArrayLike]) -> Signals:
 def _known() -> dict[str, tuple[str, str, str]]:
     """Topic, name in it, and quantity of every signal that an analysis uses, by its name."""
     known = []
-    for joint in JOINT_NAMES:
+    for joint in JOINTS:
         motor = motor_name(joint)
         known += [(COMMAND, motor, 'position'), (DESIRED, joint, 'position')]
         known += [(MOTOR, motor, quantity) for quantity in UNITS]

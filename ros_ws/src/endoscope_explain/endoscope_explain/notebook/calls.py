@@ -1,8 +1,8 @@
 """`simulate` and `explain`: the commands of these names, with results in memory."""
 
 import tempfile
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, overload
@@ -11,64 +11,44 @@ from numpy.typing import ArrayLike
 
 from endoscope_bags import open_bag
 from endoscope_core.atomic_output import atomic_directory
-from endoscope_core.choices import WAIVABLE
-from endoscope_core.errors import FileError, InputError, nearest
+from endoscope_core.errors import FileError, InputError
 from endoscope_core.physics import PlantDescription, load_plant, recording_faults
 from endoscope_core.physics.packing import pack
 from endoscope_core.rig import Rig, load_rig
 from endoscope_explain.answer_bag import write_answer
-from endoscope_explain.case import ExplainedCase
-from endoscope_explain.explanation import NamedEffect, NominalEstimate
-from endoscope_explain.fit.free_parameters import BAND
+from endoscope_explain.case import ExplainedCase, Sources
+from endoscope_explain.explanation import NominalEstimate
 from endoscope_explain.many_bags import explained_cases
-from endoscope_explain.notebook.arguments import SCRATCH, checked
+from endoscope_explain.notebook.arguments import SCRATCH, checked, takes
 from endoscope_explain.notebook.arrays import commands_from
 from endoscope_explain.notebook.signals import Signals, read
-from endoscope_explain.pipeline import Progress, Sources
+from endoscope_explain.options import Options
+from endoscope_explain.pipeline import Progress
 from endoscope_explain.report.sentences import terminal_text
 from endoscope_explain.report.writing import report_mapping, write_report
-from endoscope_explain.search.levels import MOST_EFFECTS
 
 Plant = str | Path | PlantDescription
 Bag = str | Path | Signals
+Seconds = Bag | Sequence[Bag | None] | None
+RigGiven = str | Path | Rig | None
 
 
-@dataclass(frozen=True)
-class Explained:
+class Explained(ExplainedCase):
     """An explained recording; prints itself as the command does.
 
-    Attributes
-    ----------
-    case : ExplainedCase
-        Everything that is known about it.
+    Its `verdict` is a word of `report.json`, its `effects` are what the simulation left out, most
+    certain first, and its `plant` is the improved one, which `simulate` takes.
     """
-
-    case: ExplainedCase
-
-    @property
-    def verdict(self) -> str:
-        """One of the words of `report.json`, such as `missing_physics`."""
-        return str(self.case.verdict)
-
-    @property
-    def effects(self) -> tuple[NamedEffect, ...]:
-        """What the simulation left out, most certain first."""
-        return self.case.effects
 
     @property
     def parameters(self) -> Mapping[str, Mapping[str, NominalEstimate]]:
         """Refitted parameters of the plant, by joint and name."""
-        return self.case.explanation.parameters
-
-    @property
-    def plant(self) -> PlantDescription:
-        """The improved plant, which `simulate` takes."""
-        return self.case.plant
+        return self.explanation.parameters
 
     @cached_property
     def report(self) -> dict[str, Any]:
         """What `report.json` contains."""
-        return report_mapping(self.case)
+        return report_mapping(self)
 
     def save(self, folder: str | Path) -> Path:
         """Write report.json, report.html and plant.yaml to a new or empty folder; return it.
@@ -79,11 +59,11 @@ class Explained:
             There is something in it.
         """
         with atomic_directory(folder) as partial:
-            write_report(self.case, partial)
+            write_report(self, partial)
         return Path(folder)
 
     def __repr__(self) -> str:
-        return f'{self.case.recording.name}: {self.verdict}. {terminal_text(self.case)}'
+        return f'{self.recording.name}: {self.verdict}. {terminal_text(self)}'
 
 
 @checked
@@ -93,7 +73,7 @@ def simulate(
     *,
     noise: int | None = None,
     out: str | Path | None = None,
-    rig: str | Path | Rig | None = None,
+    rig: RigGiven = None,
 ) -> Signals:
     """Simulate the plant's answer to commands.
 
@@ -138,22 +118,13 @@ def explain(bag: Sequence[Bag], plant: Plant, **options: Any) -> list[Explained]
 
 
 # The overloads separate one result from several, and leave the options to the signature below.
-@checked  # type: ignore[misc]
+@takes(Options, {'baseline': Bag | None, 'validate': Seconds, 'rig': RigGiven})
 def explain(
     bag: Bag | Sequence[Bag],
     plant: Plant,
     *,
-    baseline: Bag | None = None,
-    validate: Bag | Sequence[Bag | None] | None = None,
-    without: Collection[str] = (),
-    namespace: str | None = None,
-    rig: str | Path | Rig | None = None,
-    band: float = BAND,
-    effects: int = MOST_EFFECTS,
-    same_physics: bool = False,
-    quick: bool = False,
-    jobs: int = 2,
     progress: Progress | None = None,
+    **options: Any,
 ) -> Explained | list[Explained]:
     """Explain where recordings and their simulation differ, and what was left out.
 
@@ -163,28 +134,10 @@ def explain(
         The recording; or several, which are explained side by side.
     plant : str, Path or PlantDescription
         The simulation that is to be compared.
-    baseline : str, Path or Signals, optional
-        A healthy recording of the same rig: only what is new since is explained.
-    validate : str, Path or Signals, or a sequence of them, optional
-        A second recording of the same rig to judge the fit on; one for all, or one for each.
-    without : collection of str
-        Topics that may be missing: `motor/measured_js`.
-    namespace : str, optional
-        Of the rig's topics, where a bag has several rigs.
-    rig : str, Path or Rig, optional
-        A rig.yaml, or what it describes; the rig that the bag names by default.
-    band : float
-        By which share the plant's parameters may differ from the rig's.
-    effects : int
-        How many effects to look for on a joint at most.
-    same_physics : bool
-        Whether all recordings show one rig, so that one choice of effects has to explain all.
-    quick : bool
-        Whether to leave out the next experiment.
-    jobs : int
-        Processes side by side.
     progress : callable, optional
-        Told in a few words what is being done, such as `print`.
+        Called with a few words on what is being done, such as `print`.
+    **options
+        As of the command.
 
     Returns
     -------
@@ -196,41 +149,24 @@ def explain(
     EndoscopeError
         A recording, the plant or an option cannot be used.
     """
-    for name, number in (('band', band), ('effects', effects), ('jobs', jobs)):
-        if not number > 0:
-            raise InputError(f'{name} is {number!r}: give a number above 0')
-    for topic in without:
-        if topic not in WAIVABLE:
-            raise InputError(f'without {topic!r}: {nearest(topic, WAIVABLE)}')
     alone = isinstance(bag, Bag)
     bags = [bag] if isinstance(bag, Bag) else list(bag)
-    seconds = (
-        [validate] * len(bags) if validate is None or isinstance(validate, Bag) else list(validate)
-    )
+    validate = options['validate']
+    seconds = [validate] * len(bags) if isinstance(validate, Bag | None) else list(validate)
     if not bags or len(seconds) != len(bags):
         raise InputError(
             f'{len(bags)} recordings with {len(seconds)} in validate: give one or more, and as '
             'many in validate'
         )
-    described, described_rig = _plant(plant), _rig(rig)
+    described = _plant(plant)
+    options |= {'rig': _rig(options['rig']), 'baseline': _path_if(options['baseline'])}
+    file = None if isinstance(plant, PlantDescription) else Path(plant)
     sources = [
-        Sources(
-            _path(one),
-            described,
-            None if baseline is None else _path(baseline),
-            None if second is None else _path(second),
-            tuple(without),
-            quick,
-            band,
-            effects,
-            namespace=namespace,
-            rig=described_rig,
-            plant_file=None if isinstance(plant, PlantDescription) else Path(plant),
-        )
+        Sources(_path(one), described, plant_file=file, **options | {'validate': _path_if(second)})
         for one, second in zip(bags, seconds, strict=True)
     ]
-    cases = explained_cases(sources, jobs, same_physics=same_physics, progress=progress)
-    found = [Explained(case) for case in cases]
+    cases = explained_cases(sources, progress)
+    found = [Explained(**vars(case)) for case in cases]
     return found[0] if alone else found
 
 
@@ -246,9 +182,13 @@ def _plant(plant: Plant) -> PlantDescription:
     return plant
 
 
-def _rig(rig: str | Path | Rig | None) -> Rig | None:
+def _rig(rig: RigGiven) -> Rig | None:
     return load_rig(rig) if isinstance(rig, str | Path) else rig
 
 
 def _path(bag: Bag) -> Path:
     return bag.path if isinstance(bag, Signals) else Path(bag)
+
+
+def _path_if(bag: Bag | None) -> Path | None:
+    return None if bag is None else _path(bag)

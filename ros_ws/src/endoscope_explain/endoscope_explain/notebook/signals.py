@@ -29,7 +29,7 @@ class UnknownSignalError(EndoscopeError, KeyError):
 
 
 @dataclass(frozen=True)
-class Signal:
+class RecordedSignal:
     """One quantity of one joint, motor or wire.
 
     Attributes
@@ -57,7 +57,7 @@ class Signal:
 
 
 @dataclass(frozen=True)
-class Signals(Mapping[str, Signal]):
+class Signals(Mapping[str, RecordedSignal]):
     """The signals of a recording by name.
 
     Attributes
@@ -71,11 +71,11 @@ class Signals(Mapping[str, Signal]):
 
     path: Path
     origin: float
-    by_name: Mapping[str, Signal]
+    by_name: Mapping[str, RecordedSignal]
     # A folder that goes when nobody looks at the recording in it any more.
     _kept: Any = field(default=None, compare=False)
 
-    def __getitem__(self, name: str) -> Signal:
+    def __getitem__(self, name: str) -> RecordedSignal:
         try:
             return self.by_name[name]
         except KeyError:
@@ -171,7 +171,7 @@ def read(bag: str | Path, *, namespace: str | None = None) -> Signals:
         for quantity, unit in UNITS.items():
             values = getattr(one, quantity)
             for column, name in enumerate(one.names if values is not None else ()):
-                signal = Signal(
+                signal = RecordedSignal(
                     name_of(topic, name, quantity),
                     'N' if (topic, quantity) == (WIRES, 'effort') else unit,
                     one.seconds(origin_ns),
@@ -187,7 +187,7 @@ def name_of(topic: str, name: str, quantity: str) -> str:
     return f'{topic}:{name}' + ('' if quantity == usual else f'.{quantity}')
 
 
-def _cells(signal: Signal) -> tuple[str, ...]:
+def _cells(signal: RecordedSignal) -> tuple[str, ...]:
     steps = np.diff(signal.time)
     rate = f'{1.0 / np.median(steps):.4g} Hz' if len(steps) and np.median(steps) > 0.0 else '-'
     finite = signal.values[np.isfinite(signal.values)]

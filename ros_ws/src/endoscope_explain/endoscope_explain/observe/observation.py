@@ -18,7 +18,7 @@ from endoscope_core.physics.description import PlantDescription, SensorParameter
 from endoscope_core.physics.on_stamps import hold_on_ticks
 from endoscope_core.physics.simulator import TICK
 from endoscope_explain.observe.noise import fast_scatter, rounding_error, step_read
-from endoscope_explain.recording import QUANTITY_UNITS, Recording, Series, signal_name
+from endoscope_explain.recording import QUANTITY_UNITS, RigRecording, Series, signal_name
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -167,7 +167,7 @@ class JointObservation:
         return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
 
-def commanded(recording: Recording) -> Array:
+def commanded(recording: RigRecording) -> Array:
     """Shaft commands (N, J) in rad on ticks, from the first one to the recording's end."""
     asked = recording.command
     begin = float(asked.time[0])
@@ -175,7 +175,7 @@ def commanded(recording: Recording) -> Array:
     return hold_on_ticks(asked.time - begin, asked.values, ticks)
 
 
-def observe(recording: Recording, plant: PlantDescription) -> tuple[JointObservation, ...]:
+def observe(recording: RigRecording, plant: PlantDescription) -> tuple[JointObservation, ...]:
     """The analysis view of an audited recording, joint by joint, of those that the plant has."""
     begin, held = float(recording.command.time[0]), commanded(recording)
     ticks = len(held)
@@ -200,7 +200,7 @@ def observe(recording: Recording, plant: PlantDescription) -> tuple[JointObserva
 
 
 def _channels(
-    recording: Recording,
+    recording: RigRecording,
     j: int,
     joint: str,
     sensors: SensorParameters,

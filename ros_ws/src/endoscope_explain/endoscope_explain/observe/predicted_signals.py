@@ -11,7 +11,7 @@ from endoscope_core.physics.packing import pack, recording_faults
 from endoscope_explain.explanation import ChannelFit
 from endoscope_explain.observe.observation import JointObservation, observe
 from endoscope_explain.observe.simulated import simulate_joints
-from endoscope_explain.recording import Recording
+from endoscope_explain.recording import RigRecording
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -93,7 +93,7 @@ def reading_lead(observations: tuple[JointObservation, ...], outputs: Array) -> 
     return lead
 
 
-def view(recording: Recording, plants: Mapping[str, PlantDescription]) -> RecordedView:
+def view(recording: RigRecording, plants: Mapping[str, PlantDescription]) -> RecordedView:
     """Predict every signal of a recording by several plants."""
     # The last one is taken for the best one: its motor shows when readings were taken.
     best = list(plants.values())[-1]

@@ -3,18 +3,18 @@
 import math
 from dataclasses import dataclass
 
+from endoscope_core.names import JOINTS
 from endoscope_core.physics.effect import Parameter
-from endoscope_core.physics.plant_file import JOINT_NAMES
 from endoscope_explain.case import ExplainedCase, Ladder
 from endoscope_explain.explanation import ChannelFit, Estimate, NamedEffect
-from endoscope_explain.recording import MOVES_RAD, QUANTITY_UNITS, Recording, signal_name
+from endoscope_explain.recording import MOVES_RAD, QUANTITY_UNITS, RigRecording, signal_name
 
 PLANTS = {'nominal': 'described', 'refitted': 'refitted', 'augmented': 'improved'}
 """The one word for each plant of report.json."""
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownNumber:
     """A number with its interval, as text."""
 
     name: str
@@ -44,7 +44,7 @@ def in_degrees(name: str, unit: str) -> tuple[str, str, float]:
     return name, '' if unit == '-' else unit, 1.0
 
 
-def shown(name: str, estimate: Estimate) -> Shown:
+def shown(name: str, estimate: Estimate) -> ShownNumber:
     """An estimate as text."""
     name, unit, factor = in_degrees(name, estimate.unit)
     numbers = [factor * v for v in (estimate.value, estimate.low, estimate.high)]
@@ -55,7 +55,7 @@ def shown(name: str, estimate: Estimate) -> Shown:
     # As many digits as distinguish the ends of the interval.
     count = next((n for n in range(3, 8) if len({digits(v, n) for v in numbers[1:]}) > 1), 3)
     value, low, high = (digits(v, count) for v in numbers)
-    return Shown(name, value, low, high, unit)
+    return ShownNumber(name, value, low, high, unit)
 
 
 def measurable(effect: NamedEffect) -> dict[str, Estimate]:
@@ -64,7 +64,7 @@ def measurable(effect: NamedEffect) -> dict[str, Estimate]:
     return {name: e for name, e in effect.parameters.items() if _is_number(known[name], e)}
 
 
-def numbers_of(effect: NamedEffect) -> list[Shown]:
+def numbers_of(effect: NamedEffect) -> list[ShownNumber]:
     """The measurable parameters of an effect as text."""
     return [shown(name, e) for name, e in measurable(effect).items()]
 
@@ -78,7 +78,7 @@ def form(effect: NamedEffect) -> tuple[str, ...]:
     )
 
 
-def moving_joints(recording: Recording) -> tuple[str, ...]:
+def moving_joints(recording: RigRecording) -> tuple[str, ...]:
     """Joints whose motor was commanded to move, or moved."""
     sources = [s for s in (recording.command, recording.shaft_position) if s is not None]
     return tuple(
@@ -107,7 +107,7 @@ def judged(case: ExplainedCase, ladder: Ladder) -> dict[str, dict[str, ChannelFi
 
 def rmse(signal: str, fit: ChannelFit) -> tuple[str, str]:
     """Error of a signal and its unit, as text."""
-    _, unit, factor = in_degrees('_rad', _units(JOINT_NAMES)[signal])
+    _, unit, factor = in_degrees('_rad', _units(JOINTS)[signal])
     return digits(factor * fit.rmse), unit
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from endoscope_core.physics.functions.places import Argument
 from endoscope_core.physics.layout import OUT_JOINT, OUT_MOTOR_SPEED
 from endoscope_core.physics.simulator import TICK
-from endoscope_explain.case import Place
+from endoscope_explain.case import Mismatch
 from endoscope_explain.locate.excess import WINDOW_S
 from endoscope_explain.observe.predicted_signals import RecordedView, SignalView
 from endoscope_explain.report.figures import TIME, look
@@ -38,7 +38,7 @@ STATES = {
 
 
 @dataclass(frozen=True)
-class State:
+class Axis:
     """What a signal is drawn against."""
 
     words: str
@@ -49,15 +49,15 @@ class State:
 
 def state_of(
     recorded: RecordedView, joint: str, command: tuple[Array, Array], argument: Argument | None
-) -> State:
+) -> Axis:
     """What the missing physics depends on, or the command (rad) if it is not the joint's."""
     shown = None if argument is None else STATES.get((argument.symbol, argument.unit))
     if shown is None:
-        return State('command', 'deg', command[0], np.asarray(np.degrees(command[1]), np.float64))
+        return Axis('command', 'deg', command[0], np.asarray(np.degrees(command[1]), np.float64))
     words, unit, column, factor = shown
     values = np.asarray(factor * recorded.outputs[joint][:, column], dtype=np.float64)
     time = recorded.begin + TICK * np.arange(len(values), dtype=np.float64)
-    return State(words, unit, time, values)
+    return Axis(words, unit, time, values)
 
 
 def telling_signals(recorded: RecordedView, joint: str) -> tuple[SignalView, ...]:
@@ -94,7 +94,7 @@ def telling_passage(views: tuple[SignalView, ...]) -> tuple[float, float]:
     return begin, begin + PASSAGE_S
 
 
-def passage_figure(views: tuple[SignalView, ...], over: State, passage: tuple[float, float]) -> str:
+def passage_figure(views: tuple[SignalView, ...], over: Axis, passage: tuple[float, float]) -> str:
     """Plot signals, measured and predicted, by a state and in time, with each plant's misses."""
     loops, signals = [], []
     for one in views:
@@ -162,7 +162,7 @@ LEAST = 0.5
 
 
 def timeline_figure(
-    recorded: RecordedView, command: tuple[Array, Array], joint: str, places: Sequence[Place]
+    recorded: RecordedView, command: tuple[Array, Array], joint: str, places: Sequence[Mismatch]
 ) -> str:
     """Plot a joint's motion and, window by window, how far each prediction is off."""
     views = recorded.of_joint(joint)

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from endoscope_core.physics.effects import CATALOGUE, KNOWN
-from endoscope_explain.case import ExplainedCase, Place, changed_parameters
+from endoscope_explain.case import ExplainedCase, Mismatch, changed_parameters
 from endoscope_explain.explanation import NamedEffect, NominalEstimate, Verdict
 from endoscope_explain.recording import axis
 from endoscope_explain.report.left_open import function_of, in_words
@@ -109,7 +109,7 @@ def how_sure(effect: NamedEffect) -> str:
     return f'On simulated rigs, {of_hundred} of a hundred names as clear were right.'
 
 
-def where(place: Place) -> str:
+def where(place: Mismatch) -> str:
     """Where a mismatch shows: in which state of the rig, or in which signals."""
     how = place.regime if place.shares else ' and '.join(map(plain, place.signals))
     return f'{place.stage} of {place.joint}, {how}'
@@ -156,7 +156,7 @@ def reservations(case: ExplainedCase) -> list[str]:
     sentences += [_doubt(case, effect) for effect in doubtful]
     unlike = (f for f in left_over if f.id == 'unlike_the_plant')
     sentences += [f'{_capital(finding.text)}. {_capital(finding.remedy)}.' for finding in unlike]
-    others = case.mistakes_of_others
+    others = case.inputs.mistakes_of_others
     sentences += [f'{_capital(other)}. It was used as corrected.' for other in others]
     if case.rest in (Verdict.CONSISTENT, Verdict.INSUFFICIENT_DATA):
         return sentences

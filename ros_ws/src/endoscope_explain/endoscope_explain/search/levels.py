@@ -17,6 +17,7 @@ from endoscope_core.physics.effects import lacking
 from endoscope_core.workers import parallel_map
 from endoscope_explain.fit.model import Fit
 from endoscope_explain.fit.nominal import is_at_tolerance, with_any_numbers
+from endoscope_explain.options import MOST_EFFECTS
 from endoscope_explain.search.expansion import (
     Parent,
     Screened,
@@ -44,7 +45,6 @@ from endoscope_explain.search.refit import (
     converged,
 )
 
-MOST_EFFECTS = 2
 MOST_FITS, WORTH_A_FIT = 6, 1.0
 """Fits of what every rig has, without which all other numbers were bent, and the gain of evidence
 in nats that is worth another one."""

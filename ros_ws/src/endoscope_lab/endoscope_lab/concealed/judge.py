@@ -8,7 +8,7 @@ from endoscope_core.physics import PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_explain.explanation import Explanation, Verdict
-from endoscope_explain.recording import Recording
+from endoscope_explain.recording import RigRecording
 
 
 @dataclass(frozen=True)
@@ -34,9 +34,9 @@ class Case:
     bare: PlantDescription
     true: PlantDescription
     laws: tuple[Law, ...]  # injected; empty for a null case
-    recording: Recording  # to explain
-    second: Recording  # of another motion, for validation
-    baseline: Recording | None = None  # the rig before anything was injected
+    recording: RigRecording  # to explain
+    second: RigRecording  # of another motion, for validation
+    baseline: RigRecording | None = None  # the rig before anything was injected
     left_out: tuple[str, ...] = ()  # effects whose formulas are not tried
     # Effects and places that do not count as false names: the form of the rig itself.
     also: frozenset[str] = frozenset()
@@ -87,7 +87,7 @@ class Statement:
 
 
 @dataclass(frozen=True)
-class Judgement:
+class Correctness:
     """How far the reported statements are right."""
 
     # The first statements, as many as there are laws, name all laws; of a null case nothing is
@@ -118,18 +118,18 @@ def statements(explanation: Explanation) -> tuple[Statement, ...]:
 
 def judged(
     laws: Sequence[Law], reported: Sequence[Statement], also: frozenset[str] = frozenset()
-) -> Judgement:
+) -> Correctness:
     """Compare injected laws with statements, the most certain first; `also` is not judged."""
     named = [s for s in reported if any(_names(s, law) for law in laws)]
     wrong = [s for s in reported if s not in named and s.name not in also and not s.places & also]
     false = len({s.name for s in wrong})
     if not laws:
         none = not false
-        return Judgement(none, none, none, none, false, none, 1.0)
+        return Correctness(none, none, none, none, false, none, 1.0)
     kept = _once([s for s in reported if s in named or s in wrong], laws)
     leading = kept[: len(laws)]
     first = _all(leading, laws, _names)
-    return Judgement(
+    return Correctness(
         first,
         _all(leading, laws, _is_at),
         _all(leading, laws, lambda s, law: s.stage == law.stage),

@@ -15,7 +15,7 @@ from endoscope_core.physics import (
     simulate,
 )
 from endoscope_core.physics.sensing import quantise
-from endoscope_explain.recording import BENDING, COMMAND, MOTOR, WIRES, Recording, Series
+from endoscope_explain.recording import BENDING, COMMAND, MOTOR, WIRES, RigRecording, Series
 
 Array = NDArray[np.float64]
 
@@ -91,7 +91,7 @@ def read(plant: PlantDescription, command: Array) -> Readings:
 
 def record(
     plant: PlantDescription, command: Array, seed: int, noise: Noise | None = None
-) -> Recording:
+) -> RigRecording:
     """Readings of a rig with the noise of its sensors, as `read`."""
     return as_sensed(read(plant, command), plant.joint_names(), plant.sensors, seed, noise)
 
@@ -102,7 +102,7 @@ def as_sensed(
     described: SensorParameters,
     seed: int,
     noise: Noise | None = None,
-) -> Recording:
+) -> RigRecording:
     """Readings with the noise and the resolution of described sensors."""
     noise, own = noise or Noise(), described
     if math.isfinite(noise.freedom):
@@ -118,7 +118,7 @@ def as_sensed(
     bending = sensors.bending(
         clean.bending + added(clean.bending, tracker_s, described.tracker_noise)
     )
-    return Recording(
+    return RigRecording(
         'concealed',
         0.0,
         joints,
@@ -131,7 +131,7 @@ def as_sensed(
     )
 
 
-def misfit(plant: PlantDescription, recording: Recording, sensors: SensorParameters) -> float:
+def misfit(plant: PlantDescription, recording: RigRecording, sensors: SensorParameters) -> float:
     """Rmse of a plant's prediction over the noise of the sensors, for the worst signal."""
     predicted = in_noise(read(plant, recording.command.values).signals(), sensors)
     measured = in_noise({k: s.values for k, s in recording.measured().items()}, sensors)

@@ -11,7 +11,7 @@ import numpy as np
 
 from endoscope_explain.criteria import INTERVAL_WIDTH
 from endoscope_lab.bench import kept_rows, table_head, table_row
-from endoscope_lab.concealed.judge import Judgement
+from endoscope_lab.concealed.judge import Correctness
 from endoscope_lab.concealed.sets import JudgedContest, all_hold, mean_size
 
 GOOD = 1.3
@@ -24,7 +24,7 @@ COLUMNS = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Row(Judgement):
+class Row(Correctness):
     """Injected laws, reported names, and how far these are right."""
 
     stratum: str

@@ -14,10 +14,10 @@ from endoscope_explain.criteria import INTERVAL_WIDTH
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Estimate, Explanation
 from endoscope_lab.bench import keep_row, require_known, side_by_side
-from endoscope_lab.concealed import criteria
+from endoscope_lab.concealed import derivation
 from endoscope_lab.concealed.judge import (
     Case,
-    Judgement,
+    Correctness,
     Law,
     judged,
     statements,
@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     for (stratum, seed), each in differ:
         print(f'{stratum} {seed}: {each}')
     if args.derive:
-        criteria.derive(list(rows.values()), args.write)
+        derivation.derive(list(rows.values()), args.write)
     if before:
         print(f'{len(differ)} differences from {args.against} in {len(before)} cases')
     return 1 if differ or any(row.verdict == 'FAILED' for row in rows.values()) else 0
@@ -178,7 +178,7 @@ def _numbers(case: Case, explanation: Explanation) -> Iterator[tuple[float, Esti
 
 def failed(stratum: str, seed: int, error: BaseException) -> Row:
     """The row of a case that could not be explained: wrong in every respect."""
-    wrong = Judgement(False, False, False, False, 0, False, math.nan)
+    wrong = Correctness(False, False, False, False, 0, False, math.nan)
     return Row(
         stratum=stratum,
         seed=seed,

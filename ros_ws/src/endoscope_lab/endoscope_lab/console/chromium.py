@@ -26,7 +26,7 @@ _ARGUMENTS = (
     *('--headless=new', '--no-sandbox', '--no-first-run', '--disable-extensions'),
     *('--remote-debugging-port=0', '--window-size=1440,900'),
 )
-_PATIENCE_S = 60.0
+_BROWSER_PATIENCE_S = 60.0
 _LOOK_S = 0.02
 KEYS = {
     'Space': (' ', 32),
@@ -68,7 +68,7 @@ class Chromium(ClosedOnExit):
 
     def _connected(self) -> ClientConnection:
         place = Path(self._folder.name) / 'DevToolsActivePort'
-        end = time.monotonic() + _PATIENCE_S
+        end = time.monotonic() + _BROWSER_PATIENCE_S
         while not (place.exists() and len(lines := place.read_text().splitlines()) == 2):
             if self._process.poll() is not None or time.monotonic() > end:
                 raise BrowserError(f'chromium does not start; its status is {self._process.poll()}')
@@ -86,7 +86,7 @@ class Chromium(ClosedOnExit):
     def call(self, method: str, session: str = '', **parameters: Any) -> dict[str, Any]:
         """Send a command to the browser or to a session's tab; BrowserError if it is refused."""
         number = self.post(method, session, **parameters)
-        end = time.monotonic() + _PATIENCE_S
+        end = time.monotonic() + _BROWSER_PATIENCE_S
         while True:
             try:
                 answer = json.loads(self._socket.recv(timeout=max(0.0, end - time.monotonic())))

@@ -16,7 +16,7 @@ from endoscope_lab.bench import (
     table_row,
     today_and_machine,
 )
-from endoscope_lab.console.events import EVENTS, Outcome, undergo
+from endoscope_lab.console.events import EVENTS, EventResponse, undergo
 from endoscope_lab.console.hand import Hand
 from endoscope_lab.console.relay import Relay
 from endoscope_lab.console.served_console import SAME_RAD, ServedConsole
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _trials(name: str, hand: Hand, repetitions: int) -> int:
     """Repeat an event and print its row; return how often something crept."""
-    outcomes: list[Outcome] = []
+    outcomes: list[EventResponse] = []
     try:
         for k in range(repetitions):
             print(f'\r{name} {k + 1} of {repetitions}', end='', file=sys.stderr, flush=True)
@@ -85,7 +85,7 @@ def _in_ms(values: Sequence[float]) -> str:
     return ', '.join(f'{each:.0f}' for each in spread(values))
 
 
-def _row(name: str, outcomes: Sequence[Outcome]) -> str:
+def _row(name: str, outcomes: Sequence[EventResponse]) -> str:
     loads = [outcome.load for outcome in outcomes]
     return table_row(
         name,

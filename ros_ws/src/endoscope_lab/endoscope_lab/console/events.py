@@ -13,7 +13,7 @@ _RELEASED_S = 10.0
 
 
 @dataclass(frozen=True)
-class Event:
+class Halt:
     """An event that ends the motion."""
 
     # Triggers the event, without waiting for an answer.
@@ -23,7 +23,7 @@ class Event:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class EventResponse:
     """Response to one event."""
 
     # From the event to the last change of ``motor/servo_jp``.
@@ -78,27 +78,27 @@ def _replace_tab(hand: Hand) -> None:
 
 
 EVENTS = {
-    'dead-man let go': Event(lambda hand: hand.tab.key('Space', False), _stay),
-    'another tab in front': Event(_cover, _uncover),
-    'window minimised': Event(
+    'dead-man let go': Halt(lambda hand: hand.tab.key('Space', False), _stay),
+    'another tab in front': Halt(_cover, _uncover),
+    'window minimised': Halt(
         lambda hand: hand.tab.minimise(), lambda hand: hand.tab.minimise(False)
     ),
-    'page frozen': Event(_freeze, _thaw),
-    'page crashed': Event(lambda hand: hand.tab.post('Page.crash'), _replace_tab),
-    'page process stopped': Event(_signalled(signal.SIGSTOP), _signalled(signal.SIGCONT)),
-    'browser killed': Event(lambda hand: hand.browser.kill(), lambda hand: hand.renew_browser()),
-    'tab closed': Event(lambda hand: hand.tab.close(), lambda hand: hand.renew_tab()),
-    'page reloaded': Event(lambda hand: hand.tab.post('Page.reload'), _stay),
-    'link followed': Event(
+    'page frozen': Halt(_freeze, _thaw),
+    'page crashed': Halt(lambda hand: hand.tab.post('Page.crash'), _replace_tab),
+    'page process stopped': Halt(_signalled(signal.SIGSTOP), _signalled(signal.SIGCONT)),
+    'browser killed': Halt(lambda hand: hand.browser.kill(), lambda hand: hand.renew_browser()),
+    'tab closed': Halt(lambda hand: hand.tab.close(), lambda hand: hand.renew_tab()),
+    'page reloaded': Halt(lambda hand: hand.tab.post('Page.reload'), _stay),
+    'link followed': Halt(
         lambda hand: hand.follow_link(), lambda hand: hand.tab.value('history.back()')
     ),
-    'network silent': Event(_silence(True), _silence(False)),
-    'network cut': Event(lambda hand: hand.network.cut(), _stay),
+    'network silent': Halt(_silence(True), _silence(False)),
+    'network cut': Halt(lambda hand: hand.network.cut(), _stay),
 }
 """Events by a short description."""
 
 
-def undergo(event: Event, hand: Hand, settled_s: float, watched_s: float) -> Outcome:
+def undergo(event: Halt, hand: Hand, settled_s: float, watched_s: float) -> EventResponse:
     """Trigger an event while an operator holds the slave in motion."""
     # Changes within `settled_s` of the message on the clutch still belong to the motion; the motors
     # are watched for `watched_s` after that.
@@ -119,7 +119,7 @@ def undergo(event: Event, hand: Hand, settled_s: float, watched_s: float) -> Out
     console.passes(settled_s + watched_s)
     changes = console.motors.changes_ns()
     before = changes[changes <= settled_ns]
-    return Outcome(
+    return EventResponse(
         last_change_ms=(int(before[-1]) - at_ns) * 1e-6,
         clutch_ms=(released_ns - at_ns) * 1e-6,
         crept=console.motors.travel_since(settled_ns),

@@ -7,7 +7,7 @@ from typing import Any
 from endoscope_core.exit_status import ClosedOnExit
 from endoscope_lab.console.chromium import BrowserError, Chromium, Tab
 from endoscope_lab.console.relay import Relay
-from endoscope_lab.console.served_console import PATIENCE_S, ServedConsole
+from endoscope_lab.console.served_console import PAGE_PATIENCE_S, ServedConsole
 
 _MOVING_NS = 60_000_000
 _LOOK_S = 0.05
@@ -60,7 +60,7 @@ class Hand(ClosedOnExit):
     def take_controls(self, enable: bool = True) -> None:
         """Take the controls, and enable the slave if wanted."""
         self.let_go()
-        end = time.monotonic() + PATIENCE_S
+        end = time.monotonic() + PAGE_PATIENCE_S
         answer = ''
         while not self._seen(_MINE):
             if time.monotonic() > end:
@@ -91,7 +91,7 @@ class Hand(ClosedOnExit):
 
     def hold(self, *codes: str) -> None:
         """Hold keys until the lamp shows that the slave follows; retry if it does not."""
-        end = time.monotonic() + PATIENCE_S
+        end = time.monotonic() + PAGE_PATIENCE_S
         since = -_FOLLOWED_S
         while self._seen(_LAMP) != 'FOLLOWING':
             now = time.monotonic()
@@ -110,7 +110,7 @@ class Hand(ClosedOnExit):
 
     def move(self) -> None:
         """Hold keys until the slave moves, towards the middle or away from it."""
-        last = time.monotonic() + PATIENCE_S
+        last = time.monotonic() + PAGE_PATIENCE_S
         while time.monotonic() < last:
             goals = self.console.motors.angles
             outside = bool(goals) and goals[-1][0] > 0.0

@@ -24,7 +24,7 @@ from endoscope_nodes.runtime.qos import EVENT, profile
 from endoscope_nodes.runtime.streams import JointReader
 from endoscope_nodes.topics import Qos
 
-PATIENCE_S = 150.0
+PAGE_PATIENCE_S = 150.0
 SAME_RAD = 1e-9
 """Angles that differ by less are the same."""
 _COMMAND = (sys.executable, '-m', 'endoscope_bringup.cli', 'console', '--port', '0')
@@ -115,7 +115,7 @@ class ServedConsole(ClosedOnExit):
             raise
 
     def _await_graph(self) -> None:
-        end = time.monotonic() + PATIENCE_S
+        end = time.monotonic() + PAGE_PATIENCE_S
         while 'ready ' not in self.log.read_text():
             if time.monotonic() > end or self._process.poll() is not None:
                 raise ConsoleError(f'the console does not start: {self.log.read_text()[-2000:]}')
@@ -139,7 +139,7 @@ class ServedConsole(ClosedOnExit):
         self.client.wait_until(lambda: False, seconds)
 
     def until(
-        self, condition: Callable[[], bool], what: str, patience_s: float = PATIENCE_S
+        self, condition: Callable[[], bool], what: str, patience_s: float = PAGE_PATIENCE_S
     ) -> None:
         """Listen until a condition holds; ConsoleError on a timeout or if the program has ended."""
         end = time.monotonic() + patience_s
@@ -158,7 +158,7 @@ class ServedConsole(ClosedOnExit):
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGINT)
             try:
-                self._process.wait(PATIENCE_S)
+                self._process.wait(PAGE_PATIENCE_S)
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()

@@ -8,12 +8,11 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from endoscope_core.metrics import NoLoopError, width_at_mid_height
+from endoscope_core.names import JOINTS
 from endoscope_core.physics import PlantDescription, simulate
 from endoscope_core.physics.family import MOST_BENT, TubeFamily, shipped_family
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import CALIBRATION_RATE, CalibrationMotion, calibration_motion
-
-JOINTS = ('bend_x', 'bend_y')
 
 RELATIVE_SPREAD = {
     'capstan_exponent': 0.5,

@@ -13,7 +13,7 @@ from endoscope_lab.faults import motor_faults
 from endoscope_lab.faults.process_faults import (
     COMPOSED_FAULTS,
     PROCESS_FAULTS,
-    Outcome,
+    FaultResponse,
     undergo,
 )
 from endoscope_lab.faults.process_rig import ProcessRig
@@ -62,11 +62,11 @@ def run(args: argparse.Namespace) -> int:
     return 1 if wrong else 0
 
 
-def _is_wrong(outcome: Outcome) -> bool:
+def _is_wrong(outcome: FaultResponse) -> bool:
     return outcome.unasked > STILL or outcome.goal_share > _SHARE or outcome.enabled_s is None
 
 
-def _row(name: str, outcomes: Sequence[Outcome], loads: Sequence[float]) -> str:
+def _row(name: str, outcomes: Sequence[FaultResponse], loads: Sequence[float]) -> str:
     states = Counter(outcome.state for outcome in outcomes)
     ended = sum(len(outcome.before) for outcome in outcomes)
     still = [o.still_s * 1e3 for o in outcomes if o.still_s is not None]

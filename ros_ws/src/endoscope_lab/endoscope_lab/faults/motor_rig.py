@@ -35,7 +35,7 @@ from endoscope_nodes.runtime.qos import EVENT, RESULT, SENSOR_ASKED, SENSOR_OFFE
 from endoscope_nodes.runtime.runtime import Runtime
 from endoscope_nodes.runtime.streams import JointPublisher, JointSample, JointSubscription
 
-PATIENCE_S = 240.0
+BUS_PATIENCE_S = 240.0
 RATE_HZ = 250
 MOVING_RAD = 0.05
 TENSION_N = 5.0
@@ -142,7 +142,7 @@ class MotorRig(ClosedOnExit):
         """Last diagnostic message of a subcomponent."""
         return next((text for _, which, text in reversed(self.messages) if which == name), '')
 
-    def wait(self, condition: Callable[[], bool], patience: float = PATIENCE_S) -> bool:
+    def wait(self, condition: Callable[[], bool], patience: float = BUS_PATIENCE_S) -> bool:
         """Spin the nodes until a condition holds; whether it did within `patience` s."""
         future = Future()
 

@@ -58,7 +58,7 @@ class ProcessFault:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class FaultResponse:
     """Response to a fault; angles in rad, times in s.
 
     `state`, `cause`: operating state before the next enable, and its cause.
@@ -89,7 +89,7 @@ class Outcome:
     bag: float
 
 
-def undergo(fault: ProcessFault, rig: ProcessRig) -> Outcome:
+def undergo(fault: ProcessFault, rig: ProcessRig) -> FaultResponse:
     """Inject a fault at a random instant of the motion, and observe the response."""
     operator = rig.operator
     if fault.kills == 'recorder' and 'recorder' in rig.processes.running:
@@ -119,7 +119,7 @@ def undergo(fault: ProcessFault, rig: ProcessRig) -> Outcome:
     shafts = ShaftTrace(operator.shafts)
     still_s, unasked = shafts.standstill(since_ns, open_ns, enable_ns)
     step, share = goal_step(operator.goals, rig.facts.motors)
-    return Outcome(
+    return FaultResponse(
         state,
         cause,
         step,

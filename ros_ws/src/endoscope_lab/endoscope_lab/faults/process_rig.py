@@ -10,7 +10,7 @@ from endoscope_lab.faults.node_processes import GRAPH, NODES, NodeProcesses
 from endoscope_lab.faults.operator import Operator
 from endoscope_nodes.runtime.private_domain import private_domain
 
-PATIENCE_S = 60.0
+PROCESS_PATIENCE_S = 60.0
 _MOVED_RAD = 0.02
 
 
@@ -56,7 +56,7 @@ class ProcessRig(ClosedOnExit):
         for name in self.names:
             if name not in self.processes.running:
                 self.start(name)
-        if not self.operator.serve(PATIENCE_S, self._all_heard):
+        if not self.operator.serve(PROCESS_PATIENCE_S, self._all_heard):
             silent = sorted(set(NODES) - set(self.operator.graph.heard_ns))
             raise RuntimeError(f'silent nodes: {", ".join(silent)}')
 
@@ -113,7 +113,7 @@ class ProcessRig(ClosedOnExit):
             moved = max(abs(a - b) for a, b in zip(at, rest, strict=True)) > _MOVED_RAD
             return operator.graph.state == 'ENABLED' and moved
 
-        return time.monotonic() - began if operator.serve(PATIENCE_S, moving) else None
+        return time.monotonic() - began if operator.serve(PROCESS_PATIENCE_S, moving) else None
 
     def close(self) -> None:
         self.operator.close()

@@ -10,7 +10,7 @@ from endoscope_core.choices import PHYSICAL
 from endoscope_core.control.internal_model import PhysicalParameters
 from endoscope_core.errors import InputError
 from endoscope_core.identification.feedforward_fit import FeedforwardFit, Servo, fit_feedforward
-from endoscope_core.identification.hysteresis_fit import ModelFit, Recording, fit_model
+from endoscope_core.identification.hysteresis_fit import HysteresisRecording, ModelFit, fit_model
 from endoscope_core.identification.plant_fit import fit_plant
 from endoscope_core.identification.updated_table import (
     KINDS,
@@ -74,7 +74,7 @@ def _model_of_class(
     motor = servo.answer(dataset.desired_angle, 1.0 / CALIBRATION_RATE)[::_SAMPLE_STEP]
     actual = dataset.actual_angle[chosen, ::_SAMPLE_STEP].astype(float)
     recordings = [
-        Recording(motor, actual[k, :, j])
+        HysteresisRecording(motor, actual[k, :, j])
         for k in range(len(chosen))
         for j in range(actual.shape[2])
     ]

@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 from endoscope_core.errors import FileError, InputError
 from endoscope_core.metrics import width_at_mid_height
 from endoscope_core.physics.description import PlantDescription
-from endoscope_core.physics.family import SIGNED, Readings, TubeFamily
+from endoscope_core.physics.family import SIGNED, ReadingErrors, TubeFamily
 from endoscope_core.physics.simulator import simulate
 from endoscope_core.rig import shipped_rig
 
@@ -269,7 +269,7 @@ def _family(
     return TubeFamily(
         {key: values[key] for key in _LINES if key in values},
         values.get('friction_profile', friction_profile),
-        Readings(
+        ReadingErrors(
             (offset[0], offset[1]),
             values.get('load_cell_delay', (0.0,))[0],
             values.get('tracker_delay', (0.0,))[0],

@@ -15,7 +15,7 @@ from endoscope_core.physics.sensing import SensorModel
 from endoscope_core.physics.simulator import TICK, simulate
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import motion_by_name
-from endoscope_explain.recording import BENDING, COMMAND, MOTOR, WIRES, Recording, Series
+from endoscope_explain.recording import BENDING, COMMAND, MOTOR, WIRES, RigRecording, Series
 
 Array = NDArray[np.float64]
 Generator = np.random.Generator
@@ -94,7 +94,7 @@ def draw_motion(rng: Generator, joints: Sequence[str]) -> tuple[Array, Array]:
 
 def read(
     plant: PlantDescription, at: Array, command: Array, seed: int, noisy: bool = True
-) -> tuple[Recording, bool]:
+) -> tuple[RigRecording, bool]:
     """Recording of a rig by its sensors, and whether the rig survives the motion."""
     truth = simulate(plant, command)
     sensors = SensorModel(plant.sensors, seed)
@@ -103,7 +103,7 @@ def read(
         return Series.of(topic, time, sense(values) if noisy else values.copy())
 
     slow = slice(None, None, TRACKER_EVERY)
-    recording = Recording(
+    recording = RigRecording(
         'drawn',
         0.0,
         plant.joint_names(),
@@ -132,7 +132,7 @@ def draw_recording(
     strength: float,
     effects: int,
     noisy: bool = True,
-) -> tuple[Recording, PlantDescription]:
+) -> tuple[RigRecording, PlantDescription]:
     """A recording of a rig that survives its motion, and the plant of the rig."""
     while True:
         plant = draw_rig(rng, joints, spread, strength, effects)
@@ -146,7 +146,7 @@ def draw_recording(
             return recording, plant
 
 
-def described(recording: Recording) -> PlantDescription:
+def described(recording: RigRecording) -> PlantDescription:
     """The nominal plant, as described to the audit."""
     return PlantDescription(joints={joint: JointParameters() for joint in recording.joints})
 
@@ -156,7 +156,7 @@ def names_of(rng: Generator, count: int = 1) -> tuple[str, ...]:
     return ('bend_x', 'bend_y')[: max(count, int(rng.integers(1, 3)))]
 
 
-def sound_recording(seed: int) -> Recording:
+def sound_recording(seed: int) -> RigRecording:
     """A recording of a rig with one or two effects up to their bounds; one in ten without noise."""
     rng = np.random.default_rng(seed)
     noisy = bool(rng.random() < 0.9)

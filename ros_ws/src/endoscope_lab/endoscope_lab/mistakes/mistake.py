@@ -9,7 +9,7 @@ import numpy as np
 
 from endoscope_core.workers import worker_pool
 from endoscope_explain.audit import AuditReport, audit_recording
-from endoscope_explain.recording import BENDING, COMMAND, MOTOR, WIRES, Recording
+from endoscope_explain.recording import BENDING, COMMAND, MOTOR, WIRES, RigRecording
 from endoscope_lab.bench import table_head, table_row
 from endoscope_lab.mistakes.drawing import (
     Generator,
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-Change = Callable[[Recording, Generator], Recording]
+Change = Callable[[RigRecording, Generator], RigRecording]
 Columns = Callable[[Generator, int], list[int]]
 Expected = tuple[tuple[str, str, str], ...]
 """Id, topic and words of each finding."""
@@ -71,7 +71,7 @@ def scaled(
 ) -> Change:
     """Scale a quantity, or some of its columns, to another unit."""
 
-    def change(recording: Recording, rng: Generator) -> Recording:
+    def change(recording: RigRecording, rng: Generator) -> RigRecording:
         series = getattr(recording, quantity)
         values = series.values.reshape(len(series.values), -1).copy()
         chosen = columns(rng, values.shape[1]) if columns else list(range(values.shape[1]))
@@ -83,7 +83,7 @@ def scaled(
 
 
 def ordered(order: tuple[int, ...], *quantities: str) -> Change:
-    def change(recording: Recording, _: Generator) -> Recording:
+    def change(recording: RigRecording, _: Generator) -> RigRecording:
         changed = {}
         for quantity in quantities:
             series = getattr(recording, quantity)
@@ -98,7 +98,7 @@ def ordered(order: tuple[int, ...], *quantities: str) -> Change:
 def stamped(factor: float, *topics: str) -> Change:
     """Scale the stamps of some topics, or of all, to another unit."""
 
-    def change(recording: Recording, _: Generator) -> Recording:
+    def change(recording: RigRecording, _: Generator) -> RigRecording:
         every = {'command': recording.command, **recording.measured()}
         return recording.with_series(
             {
@@ -114,7 +114,7 @@ def stamped(factor: float, *topics: str) -> Change:
 def frozen(*quantities: str) -> Change:
     """Repeat the first reading of some quantities."""
 
-    def change(recording: Recording, _: Generator) -> Recording:
+    def change(recording: RigRecording, _: Generator) -> RigRecording:
         every = {'command': recording.command, **recording.measured()}
         return recording.with_series(
             {
@@ -129,7 +129,7 @@ def frozen(*quantities: str) -> Change:
 
 
 def together(*changes: Change) -> Change:
-    def change(recording: Recording, rng: Generator) -> Recording:
+    def change(recording: RigRecording, rng: Generator) -> RigRecording:
         for one in changes:
             recording = one(recording, rng)
         return recording
@@ -240,7 +240,7 @@ def is_reported(mistake: Mistake, report: AuditReport) -> bool:
 
 
 @dataclass(frozen=True)
-class Row:
+class AuditedMistake:
     """The audit of one recording."""
 
     name: str  # of the mistake; empty for a correct recording
@@ -252,7 +252,7 @@ class Row:
     findings: tuple[str, ...]
 
 
-def audited(name: str, seed: int) -> Row:
+def audited(name: str, seed: int) -> AuditedMistake:
     """Audit the recording of a seed with a mistake, or without one if the name is empty."""
     mistake = MISTAKES.get(name)
     if mistake is None:
@@ -268,4 +268,4 @@ def audited(name: str, seed: int) -> Row:
     mistaken = bool(report.mistakes())
     right = is_reported(mistake, report) if mistake else not mistaken
     findings = tuple(f.text for f in report.faults())
-    return Row(name, seed, right, mistaken, seconds, findings)
+    return AuditedMistake(name, seed, right, mistaken, seconds, findings)

@@ -30,7 +30,7 @@ from endoscope_lab.papers.real_recordings import (
     leave_one_out_errors,
     real_recordings,
 )
-from endoscope_lab.papers.row import PapersBench, Row
+from endoscope_lab.papers.row import Figure, PapersBench
 from endoscope_lab.papers.tracking_trial import LIMITS, never_seen_tube
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ _CASES = ((54.0, '0.21 ± 0.02'), (85.5, '0.16 to 0.22'), (105.0, '0.18 to 0.25'
 _MOST_INSTRUMENTS = 300
 
 
-def tension_by_shape_rows(settings: PapersBench) -> list[Row]:
+def tension_by_shape_rows(settings: PapersBench) -> list[Figure]:
     """Simulate `tubes` shapes of each case: one rig of one size, with bends spread differently."""
     generator = np.random.default_rng([settings.seed, 1])
     spread = np.linspace(-GREATEST_UNEVENNESS, GREATEST_UNEVENNESS, settings.tubes).tolist()
@@ -74,7 +74,7 @@ def tension_by_shape_rows(settings: PapersBench) -> list[Row]:
         return float(np.sqrt(np.mean((first - second) ** 2)))
 
     found = [
-        Row(
+        Figure(
             f'{size_deg:g} deg, among like shapes',
             [rmse(a, b) for a, b in combinations(shapes, 2)],
             paper,
@@ -84,7 +84,7 @@ def tension_by_shape_rows(settings: PapersBench) -> list[Row]:
     ]
     for first, second in combinations(range(len(_CASES)), 2):
         found.append(
-            Row(
+            Figure(
                 f'{_CASES[first][0]:g} against {_CASES[second][0]:g} deg, unlike',
                 [rmse(a, b) for a, b in product(tensions[first], tensions[second])],
             )
@@ -103,7 +103,7 @@ for each. The paper has one instrument, mounted once."""
 _INSTRUMENTS = 3
 
 
-def classifiers_rows(settings: PapersBench) -> list[Row]:
+def classifiers_rows(settings: PapersBench) -> list[Figure]:
     """Train the paper's network on folds of a data set; compare it with the shipped classifier."""
     from endoscope_lab.papers.networks import cross_validate, use_one_thread
 
@@ -126,7 +126,7 @@ def classifiers_rows(settings: PapersBench) -> list[Row]:
     return found
 
 
-def _ours(name: str, dataset: CalibrationDataset, settings: PapersBench) -> Row:
+def _ours(name: str, dataset: CalibrationDataset, settings: PapersBench) -> Figure:
     """The shipped classifier, which was trained on none of the recordings."""
     settings.report(f'ours, {name}')
     classifier = load_classifier(motion=dataset.motion)
@@ -136,7 +136,7 @@ def _ours(name: str, dataset: CalibrationDataset, settings: PapersBench) -> Row:
     ]
     right = [r.class_deg == c for r, c in zip(results, dataset.class_deg, strict=True)]
     groups = [slice(k, None, settings.tubes) for k in range(settings.tubes)]
-    return Row(
+    return Figure(
         f'ours, {name}, instruments never seen: accuracy [%]',
         [100.0 * float(np.mean(right[g])) for g in groups],
         '98.47',
@@ -144,7 +144,7 @@ def _ours(name: str, dataset: CalibrationDataset, settings: PapersBench) -> Row:
     )
 
 
-def _accuracy_row(name: str, theirs: str, validations: 'list[CrossValidation]') -> Row:
+def _accuracy_row(name: str, theirs: str, validations: 'list[CrossValidation]') -> Figure:
     shares = [100.0 * share for each in validations for share in each.accuracy]
     confusion = np.sum([each.confusion for each in validations], axis=0)
     confused = '; '.join(
@@ -153,7 +153,7 @@ def _accuracy_row(name: str, theirs: str, validations: 'list[CrossValidation]') 
         for j, count in enumerate(line)
         if i != j and count
     )
-    return Row(name, shares, theirs, note=f'{name}: {confused or "none confused"}')
+    return Figure(name, shares, theirs, note=f'{name}: {confused or "none confused"}')
 
 
 _SHAPES = (
@@ -162,7 +162,7 @@ _SHAPES = (
 )
 
 
-def nearest_class_rows(settings: PapersBench) -> list[Row]:
+def nearest_class_rows(settings: PapersBench) -> list[Figure]:
     """Compare the calibration of tubes of 94 and 102 deg with the mean plant of each class."""
     classes = {}
     for class_deg, plant in load_class_parameters(model='physical').items():
@@ -179,7 +179,7 @@ def nearest_class_rows(settings: PapersBench) -> list[Row]:
             values = [
                 float(np.rad2deg(np.sqrt(np.mean((angle - reference) ** 2)))) for angle in angles
             ]
-            found.append(Row(f'backlash {size_deg:g} deg, class {class_deg} deg', values, paper))
+            found.append(Figure(f'backlash {size_deg:g} deg, class {class_deg} deg', values, paper))
         settings.report(f'table 4: {size_deg:g} deg simulated')
     return found
 
@@ -189,7 +189,7 @@ _LARGEST = 5.0
 _BENDS = (0.0, float(np.deg2rad(270.0)))
 
 
-def reach_rows(settings: PapersBench) -> list[Row]:
+def reach_rows(settings: PapersBench) -> list[Figure]:
     """Random instruments in random tubes of the family, both joints."""
     errors = []
     for number in range(_TUBES):
@@ -206,12 +206,12 @@ def reach_rows(settings: PapersBench) -> list[Row]:
             errors.append(100.0 * abs((guess.high - guess.low) / (true.high - true.low) - 1.0))
         settings.report(f'reach: tube {number + 1} of {_TUBES}')
     return [
-        Row('error', errors, digits=1),
-        Row('largest', [max(errors)], at_most=_LARGEST, digits=1),
+        Figure('error', errors, digits=1),
+        Figure('largest', [max(errors)], at_most=_LARGEST, digits=1),
     ]
 
 
-def calibration_time_rows(settings: PapersBench) -> list[Row]:
+def calibration_time_rows(settings: PapersBench) -> list[Figure]:
     """Rest, motion and return as the calibration node commands them, and computing time."""
     # Motion in the rig's time; computing class, size and plant is timed on this machine, once for
     # each tube.
@@ -236,23 +236,23 @@ def calibration_time_rows(settings: PapersBench) -> list[Row]:
             fitting.append(time.perf_counter() - begin)
         brief = name != CALIBRATION_MOTIONS[0]
         found += [
-            Row(
+            Figure(
                 f'{name}: class and size',
                 (moving + np.array(judging)).tolist(),
                 '' if brief else '< 11',
                 at_most=5.0 if brief else 11.0,
             ),
-            Row(
+            Figure(
                 f'{name}: class, size and plant',
                 (moving + np.array(judging) + np.array(fitting)).tolist(),
                 at_most=5.0 if brief else None,
             ),
-            Row(f'{name}: of that, computing the plant', fitting),
+            Figure(f'{name}: of that, computing the plant', fitting),
         ]
     return found
 
 
-def real_sizes_rows(settings: PapersBench) -> list[Row]:
+def real_sizes_rows(settings: PapersBench) -> list[Figure]:
     """A line through the other tubes' sizes, and the shipped network; empty without recordings."""
     recordings = real_recordings()
     if not recordings:
@@ -262,7 +262,7 @@ def real_sizes_rows(settings: PapersBench) -> list[Row]:
     errors = leave_one_out_errors([recording.tension_width for recording in recordings], sizes)
     note = 'errors of each: ' + ', '.join(f'{e:+.1f}' for e in errors)
     return [
-        Row(
+        Figure(
             'straight line through the other tubes: rms error [deg]',
             [float(np.sqrt(np.mean(errors**2)))],
             '3.4 (two features picked by hand)',
@@ -273,7 +273,7 @@ def real_sizes_rows(settings: PapersBench) -> list[Row]:
     ]
 
 
-def _of_the_network(recordings: Sequence[RealRecording]) -> Row:
+def _of_the_network(recordings: Sequence[RealRecording]) -> Figure:
     """The shipped network, trained on motions of 90 deg, where these tubes moved by 60 deg."""
     classifier, motion = load_classifier(), calibration_motion()
     phase = np.arange(motion.samples) / CALIBRATION_RATE
@@ -289,7 +289,7 @@ def _of_the_network(recordings: Sequence[RealRecording]) -> Row:
             f'tube of {recording.bend} deg: {true:.1f} deg, the network {size:.1f} deg'
             f'{", refused: " + reason if reason else ""}'
         )
-    return Row(
+    return Figure(
         'the shipped 1D-CNN, trained on another motion: rms error [deg]',
         [float(np.sqrt(np.mean(np.square(errors))))],
         note='\n  '.join(notes),

@@ -16,7 +16,7 @@ from endoscope_lab.papers.real_recordings import (
     left_of_the_rest,
     real_recordings,
 )
-from endoscope_lab.papers.row import PapersBench, Row
+from endoscope_lab.papers.row import Figure, PapersBench
 from endoscope_lab.papers.tracking_trial import (
     backlash_left,
     calibrate,
@@ -38,7 +38,7 @@ _SIZES_DEG = {'descending': 55.0, 'transverse': 73.0}
 _SCHEMES = ('none', 'Bouc-Wen of the class', 'physical inverse')
 
 
-def colon_shapes_rows(settings: PapersBench) -> list[Row]:
+def colon_shapes_rows(settings: PapersBench) -> list[Figure]:
     """Track both signals uncompensated, with the paper's scheme, and with the physical inverse."""
     classifier, choice = load_classifier(), LawChoice(2)
     signals = (periodic_signal(), non_periodic_signal())
@@ -67,7 +67,7 @@ def colon_shapes_rows(settings: PapersBench) -> list[Row]:
                 key = shape, signal_name, scheme
                 if key in values:
                     found.append(
-                        Row(
+                        Figure(
                             f'{shape}, {signal_name}, {figure}, {scheme}',
                             values[key],
                             papers[offset + (scheme != 'none')],
@@ -93,7 +93,7 @@ _FEEDBACK = (
 )
 
 
-def compensators_rows(settings: PapersBench) -> list[Row]:
+def compensators_rows(settings: PapersBench) -> list[Figure]:
     """Both signals, both joints at once, feed-forward alone and with the 40 Hz tracker."""
     classifier, choice = load_classifier(), LawChoice(2)
     left: dict[str, list[float]] = {}
@@ -135,9 +135,9 @@ def compensators_rows(settings: PapersBench) -> list[Row]:
         paper, aim = papers[name]
         limit = None if aim is None else _LARGEST_PEAK_DEG
         found += [
-            Row(name, values, paper, at_most=aim, digits=1, note=note),
-            Row(f'{name}: largest peak, deg', [max(peaks[name])], at_most=limit, digits=1),
-            Row(f'{name}: largest tension, N', [max(pulled[name])], digits=1),
+            Figure(name, values, paper, at_most=aim, digits=1, note=note),
+            Figure(f'{name}: largest peak, deg', [max(peaks[name])], at_most=limit, digits=1),
+            Figure(f'{name}: largest tension, N', [max(pulled[name])], digits=1),
         ]
     return found
 
@@ -147,7 +147,7 @@ _CYCLE = 6.283185307179586
 _MIDDLE = 0.9
 
 
-def changing_tube_rows(settings: PapersBench) -> list[Row]:
+def changing_tube_rows(settings: PapersBench) -> list[Figure]:
     """Before the change, in the cycle after it, and in the cycles after that."""
     # The paper has figures without a table, so that there is nothing to compare. The signal is
     # scaled to 80 % of the reach in the tighter of the two tubes. The capstan exponent grows by 40
@@ -202,14 +202,14 @@ def changing_tube_rows(settings: PapersBench) -> list[Row]:
         'physical inverse learning, before': 5.0,
         'physical inverse learning, from the second cycle on': 10.0,
     }
-    return [Row(name, values, at_most=aims.get(name), digits=1) for name, values in left.items()]
+    return [Figure(name, values, at_most=aims.get(name), digits=1) for name, values in left.items()]
 
 
 _STRAIGHT_DEG = {'bouc_wen': 1.02}
 """Known error of the model of the straight tube, deg."""
 
 
-def real_recordings_rows(settings: PapersBench) -> list[Row]:
+def real_recordings_rows(settings: PapersBench) -> list[Figure]:
     """Errors of the models; empty, with a reported line, without the recordings."""
     recordings = real_recordings()
     if not recordings:
@@ -221,7 +221,7 @@ def real_recordings_rows(settings: PapersBench) -> list[Row]:
         for bend, (fitted, judged) in rest.items():
             known = _STRAIGHT_DEG.get(model) if bend == 0 else None
             found.append(
-                Row(
+                Figure(
                     f'{model}, tube bent {bend} deg (as fitted {np.rad2deg(fitted):.2f})',
                     [float(np.rad2deg(judged))],
                     '' if known is None else f'{known} at 0',

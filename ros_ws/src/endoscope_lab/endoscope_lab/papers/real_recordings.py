@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from endoscope_core.identification import Recording, fit_model
+from endoscope_core.identification import HysteresisRecording, fit_model
 from endoscope_core.metrics import width_at_mid_height
 from endoscope_lab.identification.family_fit import (
     ACTUAL,
@@ -96,7 +96,7 @@ def without_repeats(table: Array) -> Array:
 
 
 def left_of_the_rest(
-    recordings: Sequence[RealRecording], predicted: Callable[[Recording, Array], Array]
+    recordings: Sequence[RealRecording], predicted: Callable[[HysteresisRecording, Array], Array]
 ) -> dict[int, tuple[float, float]]:
     """RMSE in rad on 1.3 cycles, which were fitted, and on the rest of two, by the tube's bend.
 
@@ -108,14 +108,14 @@ def left_of_the_rest(
     for recording in recordings:
         first = recording.within(0.0, FITTED_CYCLES * CYCLE_S)
         rest = recording.within(FITTED_CYCLES * CYCLE_S, 2.0 * CYCLE_S)
-        seen = Recording(recording.desired[first], recording.actual[first])
+        seen = HysteresisRecording(recording.desired[first], recording.actual[first])
         error = predicted(seen, recording.desired) - recording.actual
         fitted, judged = (float(np.sqrt(np.mean(error[part] ** 2))) for part in (first, rest))
         found[recording.bend] = fitted, judged
     return found
 
 
-def hysteresis_model(model: str, seed: int) -> Callable[[Recording, Array], Array]:
+def hysteresis_model(model: str, seed: int) -> Callable[[HysteresisRecording, Array], Array]:
     """A model of the papers, for `left_of_the_rest`."""
     return lambda recording, driver: fit_model([recording], seed, model).predict(driver)
 

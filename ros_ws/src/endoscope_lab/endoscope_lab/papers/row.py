@@ -21,7 +21,7 @@ class PapersBench:
 
 
 @dataclass(frozen=True)
-class Row:
+class Figure:
     """One figure."""
 
     name: str  # what is measured, with its unit
@@ -61,7 +61,7 @@ class Row:
         return ' and '.join(parts)
 
 
-def table_text(rows: Sequence[Row]) -> str:
+def table_text(rows: Sequence[Figure]) -> str:
     """Rows in columns: figure, paper, ours, number of values, aim and whether it is reached."""
     cells = [('figure', 'paper', 'ours (mean ± sd)', 'n', 'aim', '')]
     for row in rows:

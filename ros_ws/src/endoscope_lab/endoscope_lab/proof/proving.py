@@ -9,9 +9,9 @@ from endoscope_core.workers import worker_pool
 from endoscope_explain.report.numbers import digits
 from endoscope_lab.proof import SLAVE, sentences
 from endoscope_lab.proof.trial import (
-    Answer,
     Outcome,
-    Rig,
+    SealedAnswer,
+    SealedRig,
     compared,
     explained,
     folder_of,
@@ -64,7 +64,9 @@ def _followed(
     return moved
 
 
-def _recorded(proof: Proof, folder: Path, pool: ProcessPoolExecutor, report: Report) -> list[Rig]:
+def _recorded(
+    proof: Proof, folder: Path, pool: ProcessPoolExecutor, report: Report
+) -> list[SealedRig]:
     tasks = [
         pool.submit(recorded, proof.form, proof.seed, k, proof.effect, folder / folder_of(k))
         for k in range(1, proof.count + 1)
@@ -77,8 +79,8 @@ def _recorded(proof: Proof, folder: Path, pool: ProcessPoolExecutor, report: Rep
 
 
 def _explained(
-    proof: Proof, rigs: list[Rig], pool: ProcessPoolExecutor, report: Report
-) -> dict[int, Answer]:
+    proof: Proof, rigs: list[SealedRig], pool: ProcessPoolExecutor, report: Report
+) -> dict[int, SealedAnswer]:
     tasks = [pool.submit(explained, rig.number, rig.folder, proof.command) for rig in rigs]
     answers = {}
     for task in as_completed(tasks):

@@ -17,23 +17,23 @@ from endoscope_bags.recording import rig_record
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import load_plant
 from endoscope_core.physics.plant_file import plant_from_mapping, save_plant
-from endoscope_explain.case import ExplainedCase
+from endoscope_explain.case import ExplainedCase, Sources
 from endoscope_explain.investigation.tracking import Tracked
+from endoscope_explain.many_bags import explained_case
 from endoscope_explain.observe.predicted_signals import view
-from endoscope_explain.pipeline import Sources, explain_case, read_inputs
 from endoscope_explain.recording import (
     BENDING,
     COMMAND,
     MOTOR,
     WIRES,
-    Recording,
+    RigRecording,
     Series,
     motor_name,
     wire_names,
 )
 from endoscope_explain.report.sentences import verdict_sentence
-from endoscope_explain.report.writing import PLANT_YAML, REPORT_HTML, provenance, write_report
-from endoscope_lab.concealed.judge import Judgement, Law, judged, statements
+from endoscope_explain.report.writing import PLANT_YAML, REPORT_HTML, write_report
+from endoscope_lab.concealed.judge import Correctness, Law, judged, statements
 from endoscope_lab.proof import SLAVE, slave
 from endoscope_lab.proof.drawing import drawn
 
@@ -41,7 +41,7 @@ BEGIN_NS = 1_000_000_000
 """First stamp, one second after the start of simulated time."""
 
 
-def write_bag(recording: Recording, out: Path) -> None:
+def write_bag(recording: RigRecording, out: Path) -> None:
     """Write commands, motors, wires and tip at their stamps; BagError if `out` cannot be made."""
     motors = [motor_name(joint) for joint in recording.joints]
     wires = [wire for joint in recording.joints for wire in wire_names(joint)]
@@ -111,7 +111,7 @@ PASSAGE_S = 6.0
 
 
 @dataclass(frozen=True)
-class Rig:
+class SealedRig:
     """A recorded rig, with its truth sealed."""
 
     number: int
@@ -134,7 +134,7 @@ class Passage:
 
 
 @dataclass(frozen=True)
-class Answer:
+class SealedAnswer:
     """The explanation of a rig before its seal was opened."""
 
     number: int
@@ -153,16 +153,16 @@ class Answer:
 class Outcome:
     """Truth and answer of one rig, compared."""
 
-    rig: Rig
-    answer: Answer
+    rig: SealedRig
+    answer: SealedAnswer
     truth: dict  # as it was sealed
-    judgement: Judgement
+    judgement: Correctness
     # Tracking of a motion with the inverse of the plant as described, and as improved; empty for a
     # rig that does not run.
     tracking: dict[str, Tracked] = field(default_factory=dict)
 
 
-def recorded(form: str, seed: int, number: int, effect: str | None, folder: Path) -> Rig:
+def recorded(form: str, seed: int, number: int, effect: str | None, folder: Path) -> SealedRig:
     """Draw a rig, record it twice, and seal its truth."""
     case, truth = drawn(form, seed, number, effect)
     folder.mkdir()
@@ -175,32 +175,27 @@ def recorded(form: str, seed: int, number: int, effect: str | None, folder: Path
     else:
         write_bag(case.recording, folder / RECORDING)
         write_bag(case.second, folder / SECOND)
-    return Rig(number, folder, sha256, case.laws, case.also, case.moved)
+    return SealedRig(number, folder, sha256, case.laws, case.also, case.moved)
 
 
-def explained(number: int, folder: Path, command: str) -> Answer:
+def explained(number: int, folder: Path, command: str) -> SealedAnswer:
     """Explain a rig from its recordings and the described plant, and write the report."""
     plant = load_plant(folder / PLANT)
-    sources = Sources(
-        folder / RECORDING, plant, validate=folder / SECOND, quick=True, plant_file=folder / PLANT
+    bag, second, file = (folder / name for name in (RECORDING, SECOND, PLANT))
+    case = explained_case(
+        Sources(bag, plant, validate=second, quick=True, jobs=1, plant_file=file, command=command)
     )
-    inputs = read_inputs(sources)
-    case = explain_case(inputs, jobs=1)
-    case = replace(case, provenance=provenance(sources.bag, sources.plant_file, command))
     (folder / REPORT).mkdir()
     write_report(case, folder / REPORT)
     explanation = case.explanation
-    plants = {
-        'nominal': explanation.nominal,
-        'refitted': explanation.refitted,
-        'augmented': case.plant,
-    }
-    assert inputs.validation is not None
-    seen = view(inputs.validation, plants)
+    plants = {'nominal': explanation.nominal, 'refitted': explanation.refitted}
+    plants['augmented'] = case.plant
+    assert case.inputs.validation is not None
+    seen = view(case.inputs.validation, plants)
     worst = max(seen.signals.values(), key=lambda s: np.mean(s.residual('refitted') ** 2))
     named = replace(explanation, verdict=case.verdict, effects=case.effects)
     misfit = partial(_misfit, case)
-    return Answer(
+    return SealedAnswer(
         number,
         verdict_sentence(case),
         statements(named),
@@ -212,7 +207,7 @@ def explained(number: int, folder: Path, command: str) -> Answer:
     )
 
 
-def compared(rig: Rig, answer: Answer) -> Outcome:
+def compared(rig: SealedRig, answer: SealedAnswer) -> Outcome:
     """Open a rig's seal and judge its explanation; BrokenSealError if the file was changed."""
     truth = opened(rig.folder / TRUTH, rig.sha256)
     return Outcome(rig, answer, truth, judged(rig.laws, answer.reported, rig.also))

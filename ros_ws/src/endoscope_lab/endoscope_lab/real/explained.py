@@ -24,7 +24,7 @@ from endoscope_lab.real.takes import OTHERS, STATE, TIGHTENED, TUBES, UNKNOWN_TU
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
 
-MOST_EFFECTS = 3
+MOST_OF_TUBES = 3
 ROUNDS = 4
 """Pooled fits, each started from the result of the last."""
 
@@ -34,7 +34,7 @@ Number = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Tubes:
+class ExplainedTubes:
     """The five tubes."""
 
     takes: tuple[JudgedTake, ...]  # judged on samples that were not fitted
@@ -47,7 +47,7 @@ class Tubes:
     explained: tuple[Fit, ...]
 
 
-def explained_tubes(folder: Path, jobs: int, report: Report) -> Tubes:
+def explained_tubes(folder: Path, jobs: int, report: Report) -> ExplainedTubes:
     """Fit all tubes together on their first 1.3 cycles, and search for missing physics."""
     takes = [read(folder / f'{name}.txt') for name in TUBES]
     fitted_s = [FITTED_CYCLES * take.cycle_s for take in takes]
@@ -61,7 +61,7 @@ def explained_tubes(folder: Path, jobs: int, report: Report) -> Tubes:
         log.append(text)
         report(text)
 
-    tried = search(list(zip(fits, described, strict=True)), jobs, MOST_EFFECTS, report=logged)
+    tried = search(list(zip(fits, described, strict=True)), jobs, MOST_OF_TUBES, report=logged)
     named = bool(tried.found.effects) or not tried.levels
     chosen = tried.found if named else tried.levels[-1].best
     explained = chosen.fits
@@ -76,7 +76,7 @@ def explained_tubes(folder: Path, jobs: int, report: Report) -> Tubes:
             'augmented': Plant.of(after).on(whole),
         }
         judged.append(JudgedTake(take, end, plants))
-    return Tubes(
+    return ExplainedTubes(
         tuple(judged),
         chosen.effects,
         named,
@@ -119,7 +119,7 @@ def numbers(fits: Sequence[Fit], jobs: int) -> dict[str, list[Number | None]]:
 
 
 @dataclass(frozen=True)
-class State:
+class OtherState:
     """The rig in another state."""
 
     takes: tuple[JudgedTake, ...]  # the recording that was fitted, then those predicted from it
@@ -129,7 +129,7 @@ class State:
     alone: tuple[str, ...]  # names given by this recording alone
 
 
-def explained_state(folder: Path, tubes: Tubes, jobs: int, report: Report) -> State:
+def explained_state(folder: Path, tubes: ExplainedTubes, jobs: int, report: Report) -> OtherState:
     """Explain a recording of the rig in another state by the tubes' effects, predict the others."""
     take = read(folder / f'{STATE}.txt')
     observation = take.observation()
@@ -160,9 +160,9 @@ def explained_state(folder: Path, tubes: Tubes, jobs: int, report: Report) -> St
         judged.append(JudgedTake(other, 0.0, plants))
     report(f'{take.name}: explaining it alone')
     cycle = Plant.of(before).on(take.until(take.cycle_s).observation()).refitted()
-    decision = decide(search([(cycle,)], jobs, MOST_EFFECTS), jobs)
+    decision = decide(search([(cycle,)], jobs, MOST_OF_TUBES), jobs)
     alone = tuple(term.name for term in decision.missing)
-    return State(tuple(judged), after, needed, alone)
+    return OtherState(tuple(judged), after, needed, alone)
 
 
 def _has_all(found: Fit, effects: Sequence[str]) -> bool:
@@ -178,7 +178,7 @@ def _plants(before: Fit, after: Fit, seen: JointObservation) -> dict[str, Plant]
     }
 
 
-def unknown_tubes(folder: Path, tubes: Tubes, report: Report) -> list[JudgedTake]:
+def unknown_tubes(folder: Path, tubes: ExplainedTubes, report: Report) -> list[JudgedTake]:
     """Recordings in tubes without a description.
 
     The instrument is that of the five tubes. The tube's own parameters are refitted, and those that

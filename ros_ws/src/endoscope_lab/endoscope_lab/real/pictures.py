@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from endoscope_explain.report.numbers import PLANTS as LABEL
 from endoscope_lab.real.alone import Withheld
-from endoscope_lab.real.explained import Tubes
+from endoscope_lab.real.explained import ExplainedTubes
 from endoscope_lab.real.rig import JudgedTake
 from endoscope_lab.real.takes import TUBES
 from endoscope_lab.still_pictures import INK, STYLE, svg, thinned
@@ -20,7 +20,7 @@ LINE = {
 }
 
 
-def five_loops(tubes: Tubes) -> str:
+def five_loops(tubes: ExplainedTubes) -> str:
     """The last loop of each tube as measured, and simulated without and with what was missing."""
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(11.0, 2.9), layout='constrained')

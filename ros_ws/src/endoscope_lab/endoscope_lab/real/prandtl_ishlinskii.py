@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from endoscope_core.identification import Recording
+from endoscope_core.identification import HysteresisRecording
 
 Array = NDArray[np.float64]
 
@@ -15,7 +15,7 @@ _WEIGHTS = (1.0 / 40.0, 3.0)
 """Least weight of the first play, which passes its input, and greatest of any."""
 
 
-def fitted(recording: Recording, driver: Array) -> Array:
+def fitted(recording: HysteresisRecording, driver: Array) -> Array:
     """Actual angle (N,) in rad for a driving angle, by a model fitted to a recording from rest.
 
     ``theta_a = offset + sum_i w_i p_i`` with `p_i` the play of threshold `r_i` (Krejci and Kuhnen

@@ -38,7 +38,7 @@ PLANT = PlantDescription(
 rig's kinematics and cells."""
 SERVO = ('motor_bandwidth', 'motor_damping_ratio')
 """The motors' currents show their lag, 55 to 92 ms, so that these keep the usual tolerance."""
-BAND = 3.0
+REAL_BAND = 3.0
 """Tolerance of all other parameters: five times the described ones, or a fifth."""
 STANDS, STEPS = 1e-5, 60
 """Convergence tolerance (share of the cost) and largest number of steps of a fit."""
@@ -50,7 +50,7 @@ def wide(observation: JointObservation) -> JointModel:
     servo = {p.index: p for p in nominal_parameters(base) if p.name in SERVO}
     free = [
         servo.get(p.index, p)
-        for p in nominal_parameters(base, BAND)
+        for p in nominal_parameters(base, REAL_BAND)
         if p.index not in (LEAD, JOINT_RADIUS)
     ]
     like = next(p for p in free if p.name == 'joint_stiffness')

@@ -18,9 +18,9 @@ from endoscope_lab.papers.real_recordings import left_of_the_rest, real_recordin
 from endoscope_lab.real import prandtl_ishlinskii
 from endoscope_lab.real.alone import Alone, Withheld, each_alone, name_withheld
 from endoscope_lab.real.explained import (
+    ExplainedTubes,
     Number,
-    State,
-    Tubes,
+    OtherState,
     explained_state,
     explained_tubes,
     numbers,
@@ -154,10 +154,10 @@ fourth column's name is that of the last plant."""
 
 
 def sections(
-    tubes: Tubes,
+    tubes: ExplainedTubes,
     numbers: Mapping[str, Sequence[Number | None]],
     black_box: Mapping[str, float],
-    state: State,
+    state: OtherState,
     of_state: Mapping[str, Sequence[Number | None]],
     unknown: Sequence[JudgedTake],
 ) -> list[Section]:
@@ -290,7 +290,7 @@ def as_text(parts: Iterable[Section]) -> str:
     )
 
 
-def in_short(tubes: Tubes, box: Mapping[str, float]) -> dict[str, object]:
+def in_short(tubes: ExplainedTubes, box: Mapping[str, float]) -> dict[str, object]:
     """Summary of the page: mean rms of the angle that was not fitted, deg."""
 
     def mean(radians: Iterable[float]) -> float:

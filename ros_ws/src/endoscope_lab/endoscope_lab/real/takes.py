@@ -16,7 +16,7 @@ from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics.description import JointParameters, PlantDescription, SensorParameters
 from endoscope_core.rig import shipped_rig
 from endoscope_explain.observe.observation import JointObservation, observe, with_held_noise
-from endoscope_explain.recording import BENDING, COMMAND, WIRES, Recording, Series
+from endoscope_explain.recording import BENDING, COMMAND, WIRES, RigRecording, Series
 from endoscope_lab.identification.family_fit import DESIRED, PHASE
 from endoscope_lab.papers.real_recordings import without_repeats
 
@@ -66,10 +66,10 @@ class Take:
             tension=None if self.tension is None else self.tension[read],
         )
 
-    def recording(self) -> Recording:
+    def recording(self) -> RigRecording:
         """The recording for `explain`, with stamps of tensions corrected for their latency."""
         tension = np.full((len(self.seen), 2), np.nan) if self.tension is None else self.tension
-        return Recording(
+        return RigRecording(
             self.name,
             0.0,
             (JOINT,),

@@ -10,8 +10,8 @@ from endoscope_core.classifier.classification import LEVEL, nearest_class
 from endoscope_core.classifier.cnn_classifier import (
     KNOWN,
     CnnClassifier,
+    Estimates,
     HeldOutCalibration,
-    Judgement,
     first,
     logarithm,
     stretched,
@@ -204,7 +204,7 @@ def calibrated(
     return CnnClassifier(weights, widest(calibrations), CLASSES_DEG, motion), figures
 
 
-def calibration_of(held_out: Judgement, true: Array, of_all_kinds: Judgement) -> HeldOutCalibration:
+def calibration_of(held_out: Estimates, true: Array, of_all_kinds: Estimates) -> HeldOutCalibration:
     """Calibration on recordings of rigs held out, whose true sizes in rad are known.
 
     Intervals: split conformal prediction with errors in units of the network's own deviation
@@ -237,7 +237,7 @@ def counted(report: Report, name: str) -> Callable[[int, int], None]:
     return count
 
 
-def _judged(classifier: CnnClassifier, readings: Single) -> Judgement:
+def _judged(classifier: CnnClassifier, readings: Single) -> Estimates:
     parts = [
         classifier.judged(logarithm(stretched(part)))
         for part in np.array_split(readings, max(1, len(readings) // 64))
@@ -245,20 +245,20 @@ def _judged(classifier: CnnClassifier, readings: Single) -> Judgement:
     return _joined(parts)
 
 
-def _joined(parts: list[Judgement]) -> Judgement:
-    return Judgement(*(np.concatenate(each) for each in zip(*map(_columns, parts), strict=True)))
+def _joined(parts: list[Estimates]) -> Estimates:
+    return Estimates(*(np.concatenate(each) for each in zip(*map(_columns, parts), strict=True)))
 
 
-def _rows(judgement: Judgement, rows: slice) -> Judgement:
-    return Judgement(*(column[rows] for column in _columns(judgement)))
+def _rows(judgement: Estimates, rows: slice) -> Estimates:
+    return Estimates(*(column[rows] for column in _columns(judgement)))
 
 
-def _columns(judgement: Judgement) -> tuple[Array, ...]:
+def _columns(judgement: Estimates) -> tuple[Array, ...]:
     return tuple(vars(judgement).values())
 
 
 def _calibration(
-    judgements: dict[int, Judgement], size: Array, of_all_kinds: Judgement, rows: slice
+    judgements: dict[int, Estimates], size: Array, of_all_kinds: Estimates, rows: slice
 ) -> HeldOutCalibration:
     parts = [_rows(judgement, rows) for judgement in judgements.values()]
     return calibration_of(
@@ -266,7 +266,7 @@ def _calibration(
     )
 
 
-def _figures(judge: CnnClassifier, judgement: Judgement, size: Array) -> dict[str, float]:
+def _figures(judge: CnnClassifier, judgement: Estimates, size: Array) -> dict[str, float]:
     results = judge.results(judgement)
     refused = [bool(reason) for reason in judge.reasons_to_refuse(judgement)]
     nearest = [nearest_class(true, CLASSES_DEG) for true in size.tolist()]

@@ -13,7 +13,7 @@ from endoscope_core.errors import NotPlayedError, OutputError, RigStoppedError
 from endoscope_core.investigation_folder import is_left_behind
 from endoscope_nodes import names
 from endoscope_nodes.client.graph_client import GraphClient
-from endoscope_nodes.client.graph_listener import MASTER, RECORDER, GraphError
+from endoscope_nodes.client.graph_listener import MASTER, PATIENCE_S, RECORDER, GraphError
 from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
 from endoscope_nodes.client.handle_sender import clutch_message
 from endoscope_nodes.client.plant_adoption import (
@@ -25,7 +25,6 @@ from endoscope_nodes.runtime.node_parameters import FOR_SESSION
 from endoscope_nodes.runtime.qos import EVENT
 
 RECORDER_NODE = 'recorder'
-PATIENCE_S = 20.0
 NEXT_WORD_S = 1.5
 """The master says once a second how far it is; a word from before means nothing."""
 LET_GO_S = 0.2
@@ -42,7 +41,7 @@ Consent = Callable[[str], bool]
 """Asks a person, in words, whether something may be done."""
 
 
-class PlayedMotion(Protocol):
+class MotionToPlay(Protocol):
     """A motion as its player knows it."""
 
     @property
@@ -84,7 +83,7 @@ class MotionPlayer:
         self._plants = plants or AdoptedPlants(client)
         self.prepares = False  # once consented to, whether it may not be enabled yet
 
-    def play(self, motion: PlayedMotion, file: Path, bag: Path, plant: Path | None = None) -> None:
+    def play(self, motion: MotionToPlay, file: Path, bag: Path, plant: Path | None = None) -> None:
         """Play a motion, which a file holds, and record it to a bag that does not exist.
 
         With a plant file the compensator inverts that plant meanwhile; what was in force before is
@@ -210,7 +209,7 @@ class MotionPlayer:
             publisher.publish(clutch_message(False, client.graph_ns))
             client.node.destroy_publisher(publisher)
 
-    def _played(self, motion: PlayedMotion, file: Path) -> None:
+    def _played(self, motion: MotionToPlay, file: Path) -> None:
         client = self._client
         session = self._session()
         path = str(file.absolute())

@@ -16,9 +16,9 @@ from endoscope_bags.cdr_decoding import Payloads
 from endoscope_bags.errors import BagError
 from endoscope_bags.joint_state_series import JointStateSeries, decode_joint_states
 from endoscope_core.errors import FileError
-from endoscope_core.monitoring import Alarm, RigWatch
-from endoscope_core.monitoring.criteria import FALSE_ALARMS_PER_HOUR
+from endoscope_core.monitoring import DetectedChange, RigWatch
 from endoscope_core.monitoring.rig_watch import BLOCK_S, LEARNT, WINDOWS
+from endoscope_core.monitoring.thresholds import FALSE_ALARMS_PER_HOUR
 from endoscope_core.physics import PlantDescription
 from endoscope_core.physics.plant_file import plant_from_mapping
 from endoscope_core.schema import parse_yaml
@@ -97,7 +97,7 @@ class WatchNode(EndoscopeNode):
         self._origin_ns = 0
         self._newest_s = 0.0
         self._heard_ns = self.ticker.monotonic_ns()
-        self._alarms: dict[str, Alarm] = {}
+        self._alarms: dict[str, DetectedChange] = {}
         self._kept: set[str] = set()
         # Of small matrices: threads for each would stand in the way of the other nodes.
         threadpool_limits(1, 'blas')
@@ -213,7 +213,7 @@ class WatchNode(EndoscopeNode):
         if news:
             self.diagnostics.publish()
 
-    def _in_words(self, alarm: Alarm) -> str:
+    def _in_words(self, alarm: DetectedChange) -> str:
         return f'{alarm}, since {self._utc(alarm.since)}, margin {alarm.margin:.1f}'
 
     def _utc(self, seconds: float) -> str:

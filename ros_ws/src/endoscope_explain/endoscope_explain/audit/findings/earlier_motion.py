@@ -23,7 +23,7 @@ from endoscope_explain.audit.examined import Examined, without_times
 from endoscope_explain.audit.finding import FindingKind, Severity
 from endoscope_explain.observe.observation import ANALYSIS_PERIOD, JointObservation, observe
 from endoscope_explain.observe.predicted_signals import Flags, packed_rig
-from endoscope_explain.recording import LEAST_DURATION_S, MOVES_RAD, Array, Mask, Recording
+from endoscope_explain.recording import LEAST_DURATION_S, MOVES_RAD, Array, Mask, RigRecording
 
 NOT_JUDGED = FindingKind(
     'earlier_motion',
@@ -270,7 +270,7 @@ def _is_more_than_noise(squares: Array) -> bool:
     return mean > 1.0 and len(squares) * (mean - 1.0 - log(mean)) > log(len(squares))
 
 
-def _is_enough(recording: Recording, joint: int, since: float) -> bool:
+def _is_enough(recording: RigRecording, joint: int, since: float) -> bool:
     command = recording.command
     later = command.values[command.time >= since, joint]
     long = recording.duration - since >= LEAST_DURATION_S

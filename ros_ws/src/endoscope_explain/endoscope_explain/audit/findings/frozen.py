@@ -9,7 +9,14 @@ import numpy as np
 from endoscope_explain.audit.examined import Examined
 from endoscope_explain.audit.finding import Column, Finding, FindingKind, Severity, column_name
 from endoscope_explain.audit.plausibility import Comparison
-from endoscope_explain.recording import LEAST_DURATION_S, MOTOR, MOVES_RAD, Array, Recording, Series
+from endoscope_explain.recording import (
+    LEAST_DURATION_S,
+    MOTOR,
+    MOVES_RAD,
+    Array,
+    RigRecording,
+    Series,
+)
 
 KIND = FindingKind(
     'frozen',
@@ -72,7 +79,7 @@ def moves(series: Series | None) -> bool:
     return series is not None and bool(np.ptp(series.values, axis=0).max() >= MOVES_RAD)
 
 
-def without(recording: Recording, frozen: Sequence[Finding]) -> Recording:
+def without(recording: RigRecording, frozen: Sequence[Finding]) -> RigRecording:
     """The recording without what stood still; a motor that did is as one that was not recorded."""
     since = {signal: f.intervals[0][0] for f in frozen for signal in f.signals}
     changed: dict[str, Any] = {}

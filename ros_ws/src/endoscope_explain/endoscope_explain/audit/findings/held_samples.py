@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from endoscope_explain.audit.examined import Examined
 from endoscope_explain.audit.finding import Column, Finding, FindingKind, Severity
 from endoscope_explain.audit.stamps import GAP_FACTOR, runs, usual_interval
-from endoscope_explain.recording import Array, Mask, Recording, Series
+from endoscope_explain.recording import Array, Mask, RigRecording, Series
 
 KIND = FindingKind(
     'held_samples',
@@ -63,7 +63,7 @@ def _repeated(quantity: str, series: Series, seen: Examined) -> Mask | None:
     return held & series.valid.reshape(held.shape)
 
 
-def _finding(recording: Recording, column: Column, time: Array, repeated: Mask) -> Finding:
+def _finding(recording: RigRecording, column: Column, time: Array, repeated: Mask) -> Finding:
     """What one column repeats, of stamps (N,) in s; a note while it is short."""
     spans = [(float(time[a - 1]), float(time[b])) for a, b in runs(repeated)]
     longest = max(b - a for a, b in spans)

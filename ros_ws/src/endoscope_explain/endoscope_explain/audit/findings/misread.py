@@ -11,7 +11,7 @@ from endoscope_explain.audit.finding import Finding, FindingKind, Severity, colu
 from endoscope_explain.audit.findings import frozen
 from endoscope_explain.audit.misreading import Misreading
 from endoscope_explain.audit.plausibility import Comparison, as_meant
-from endoscope_explain.recording import QUANTITY_UNITS, Array, Recording
+from endoscope_explain.recording import QUANTITY_UNITS, Array, RigRecording
 
 MISFITS = ' (misfit {percent:.3g} % as recorded, {percent_corrected:.3g} % as corrected)'
 UNIT = FindingKind(
@@ -93,7 +93,9 @@ def find(seen: Examined) -> Examined:
     return seen.found(*found.values(), recording=meant)
 
 
-def _finding(recording: Recording, mistake: Misreading, before: Shares, after: Shares) -> Finding:
+def _finding(
+    recording: RigRecording, mistake: Misreading, before: Shares, after: Shares
+) -> Finding:
     """A mistake, with the misfits before and after all are put right."""
     quantity = mistake.quantity
     evidence = {'misfit': _misfit(mistake, before), 'misfit_corrected': _misfit(mistake, after)}

@@ -8,7 +8,7 @@ from endoscope_explain.audit.examined import Examined, without_times
 from endoscope_explain.audit.finding import Finding, FindingKind, Severity
 from endoscope_explain.audit.stamps import find_gaps, usual_interval
 from endoscope_explain.explanation import Estimate
-from endoscope_explain.recording import MOVES_RAD, Recording, Series
+from endoscope_explain.recording import MOVES_RAD, RigRecording, Series
 
 MISSING = FindingKind(
     showing(Symptom.MISSING_SAMPLES).id,
@@ -67,7 +67,7 @@ def find(seen: Examined) -> Examined:
     return seen.found(*found, recording=recording)
 
 
-def _missing(recording: Recording, lost: Gaps, intervals: dict[str, float]) -> Finding:
+def _missing(recording: RigRecording, lost: Gaps, intervals: dict[str, float]) -> Finding:
     """One finding of all topics, whose `time_s` is where the longest gap begins."""
     every = sorted(((b - a, a, b, t) for t, gaps in lost.items() for a, b in gaps), reverse=True)
     length, begin, _, topic = every[0]

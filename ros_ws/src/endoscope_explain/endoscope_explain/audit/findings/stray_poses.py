@@ -11,7 +11,7 @@ from endoscope_explain.audit.findings.held_samples import COARSE
 from endoscope_explain.audit.plausibility import NORMAL_MEDIAN
 from endoscope_explain.audit.stamps import usual_interval
 from endoscope_explain.explanation import NINETY_PERCENT, Estimate
-from endoscope_explain.recording import Array, Mask, Recording
+from endoscope_explain.recording import Array, Mask, RigRecording
 
 KIND = FindingKind(
     showing(Symptom.WRONG_SAMPLES).id,
@@ -42,7 +42,7 @@ def find(seen: Examined) -> Examined:
     return seen.found(found, recording=recording.with_series({'bending': bending}))
 
 
-def _finding(recording: Recording, wrong: Mask) -> Finding:
+def _finding(recording: RigRecording, wrong: Mask) -> Finding:
     """One finding, of the joint with most wrong samples (N, J): one tracker reads all."""
     series = recording.bending
     sizes = []

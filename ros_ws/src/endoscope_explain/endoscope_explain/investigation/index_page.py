@@ -5,12 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from endoscope_core.signals.command_file import JOINTS, read_command_file
+from endoscope_core.names import JOINTS
+from endoscope_core.signals.command_file import read_command_file
 from endoscope_explain.investigation.log import (
     CUT_SHORT,
     PLANT,
-    Answer,
     Log,
+    RigAnswer,
     answered,
     asked,
     recorded,
@@ -55,7 +56,7 @@ def page(log: Log, folder: Path) -> str:
     )
 
 
-def _names(answer: Answer) -> str:
+def _names(answer: RigAnswer) -> str:
     rows = [
         (name.id, name.joint, name.left_open or ', '.join(name.rivals) or 'none', name.strength)
         for name in answer.names
