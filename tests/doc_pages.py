@@ -23,7 +23,7 @@ PAGES = sorted(
     }
 )
 
-LANGUAGES = {'console', 'python', 'yaml', 'json', 'text'}
+LANGUAGES = {'console', 'python', 'yaml', 'json', 'text', 'xml'}
 NOT_RUN = {
     'long': 'takes minutes, and is run by the checks before a merge',
     'hardware': 'needs a real instrument, or stays at the terminal as one does',

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped
 from probed_graph import ProbedRuntime
 from rclpy.context import Context
 from sensor_msgs.msg import JointState, Joy
@@ -81,6 +81,7 @@ SESSION = '/endoscope/slave/motion_session'
 JOINT_STATES = '/endoscope/joint_states'
 TRANSFORMS = '/tf'
 DIAGNOSTICS = '/diagnostics'
+TIP_VELOCITY = '/endoscope/slave/servo_cv'
 N = 400
 
 
@@ -109,6 +110,7 @@ def record_all_types(path: Path):
         links = session.publisher(message_class(TF_MESSAGE), TRANSFORMS, SENSOR_OFFERED)
         diagnostics = session.publisher(DiagnosticArray, DIAGNOSTICS, EVENT)
         diagnostics.publish(DiagnosticArray())
+        session.publisher(TwistStamped, TIP_VELOCITY, COMMAND).publish(TwistStamped())
 
         def publish() -> None:
             k = len(sent[SERVO])

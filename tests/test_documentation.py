@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+import xml.etree.ElementTree as ElementTree
 from dataclasses import fields
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_explain.report.sentences import EVIDENCE
 from endoscope_explain.report.writing import KEYS
 from endoscope_nodes import program
+from endoscope_nodes.names import JOINTS
 from endoscope_nodes.runtime.node_parameters import OF_NODE, OF_PROCESS
 from endoscope_nodes.runtime.parameters import described
 from endoscope_nodes.services import SERVICES
@@ -240,6 +242,14 @@ def test_what_other_programs_have_is_said_to_be_here_by_names_that_there_are() -
     assert len(topics) > 10
     types = {one.type.replace('/msg/', '/') for one in TOPICS}
     assert set(topics) <= {one.name for one in TOPICS} | types
+    [control] = [
+        ElementTree.fromstring(block.text)
+        for block in blocks(WORKSPACE / 'doc/coming_from.md')
+        if block.language == 'xml'
+    ]
+    assert tuple(joint.get('name') for joint in control.iter('joint')) == JOINTS
+    states = control.find('hardware/param[@name="joint_states_topic"]').text
+    assert states.removeprefix('/endoscope/') in {one.name for one in TOPICS}
     rig = yaml.safe_load((WORKSPACE / 'src/endoscope_core/endoscope_core/rig/rig.yaml').read_text())
     keys = re.findall(r'`(joints|timeouts)\.(\w+)`', here)
     assert keys

@@ -8,6 +8,8 @@ from endoscope_nodes.nodes.recorder import RecorderNode
 
 SOLE_PUBLISHERS = {
     'slave/servo_jp': {'master'},
+    'slave/servo_jv': {'handle'},
+    'slave/servo_cv': {'handle'},
     'motor/servo_jp': {'compensator'},
     'slave/operating_state': {'supervisor'},
     'slave/motion_session': {'supervisor'},

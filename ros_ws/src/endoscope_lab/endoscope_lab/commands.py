@@ -90,6 +90,15 @@ BENCHES: dict[str, Bench] = {
             ),
         ),
     ),
+    'stick': Bench(
+        'stick',
+        'latency of velocities that another process commands',
+        'Runs all nodes on the simulated slave in one process in real time. Another process '
+        'commands velocities on slave/servo_jv that reverse every 0.2 s. Measures the time from '
+        'its sending a reversal until the tick in which the motor driver obeys the first command '
+        'made of it. Exits 1 if the 99th percentile is 3 ms or more.',
+        (_seconds(60.0, 'length of the measurement'),),
+    ),
     'console': Bench(
         'console.console',
         'time until the slave stops after an event on the page',

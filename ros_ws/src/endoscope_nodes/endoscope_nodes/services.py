@@ -19,6 +19,12 @@ class Service:
 
 # fmt: off
 SERVICES = (
+    Service(names.SLAVE_STOP, 'supervisor',
+            'ends the motion session as `pause` does: the measured position is held; without a '
+            'session nothing changes'),
+    Service(names.SLAVE_HOME, 'calibration',
+            'takes the motors to zero as `home` does, which needs an enabled slave; '
+            'calibration/feedback says how it fares'),
     Service(names.CALIBRATION_RUN, 'calibration',
             'begins a calibration, which needs an enabled slave; calibration/result says how it '
             'went'),

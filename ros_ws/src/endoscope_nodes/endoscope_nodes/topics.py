@@ -76,8 +76,18 @@ TOPICS = (
           'controller'),
           _STREAM,
           'desired bending: `position` in rad and `velocity` in rad/s of `bend_x` and `bend_y`, '
-          "`header.frame_id` the motion session; the master's unless its source is `none`",
-          one_sender=True),
+          "`header.frame_id` the motion session; the master's unless its source is `none` and "
+          'nobody commands velocities', one_sender=True),
+    GraphTopic(names.SLAVE_VELOCITY, _JOINT_STATE, None, COMMAND, (), ('master',),
+          'more than 10 Hz',
+          'desired velocity of bending: `velocity` in rad/s of `bend_x` and `bend_y`, '
+          '`header.frame_id` the motion session; obeyed while the clutch is held and '
+          '`master.source` is `none`, zero after 150 ms of silence', one_sender=True),
+    GraphTopic(names.TIP_VELOCITY, 'geometry_msgs/msg/TwistStamped', None, COMMAND, (),
+          ('master',), 'more than 10 Hz',
+          "instead of `slave/servo_jv`, velocity of the tip in the tip's frame: `angular.x` and "
+          '`angular.y` in rad/s or, where both are zero, `linear.x` and `linear.y` in m/s; the '
+          'rest is ignored and reported; `header.frame_id` the motion session', one_sender=True),
     GraphTopic(names.SLAVE_MEASURED, _JOINT_STATE, *_SENSOR, ('em_tracker',),
           (*_MOVERS, 'calibration', 'instrument_model', 'watch'), '40 Hz',
           'bending by the EM tracker: `position` in rad of `bend_x` and `bend_y`', one_sender=True),

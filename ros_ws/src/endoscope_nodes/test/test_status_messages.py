@@ -16,7 +16,6 @@ from endoscope_core.physics import JointParameters
 from endoscope_core.rig import load_rig
 from endoscope_core.safety import AdoptionCode, BendingRange
 from endoscope_nodes.client.calibration_result import (
-    Reach,
     aborted_result,
     findings_of,
     is_of_no_class,

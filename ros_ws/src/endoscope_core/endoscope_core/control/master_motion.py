@@ -1,4 +1,4 @@
-"""Where a master has the slave go: a motion that is played, or a handle that is followed."""
+"""Where a master has the slave go: by a motion, a handle, or velocities that are commanded."""
 
 import operator
 from abc import ABC, abstractmethod
@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from endoscope_core.control.handle import Handle, HandleSettings
 from endoscope_core.control.range_cut import RangeCut
+from endoscope_core.control.velocity_stream import VelocityStream, bounded_speed
 from endoscope_core.names import JOINTS
 from endoscope_core.rig import Rig
 from endoscope_core.safety import BendingRange, MotionLimits, MotionShaper
@@ -131,6 +132,47 @@ class FollowedHandle(MotionSource):
         return self.followed or Desired(position, (0.0,) * len(position))
 
 
+class CommandedVelocity(MotionSource):
+    """Velocities from where the slave is, which another program commands with the clutch held.
+
+    They are braked before the end of the range: `cut` only counts and reports that.
+    """
+
+    def __init__(self, limits: MotionLimits, stream: VelocityStream, cut: RangeCut) -> None:
+        super().__init__(limits)
+        self._stream, self._cut = stream, cut
+        self.ranges: tuple[BendingRange, ...] = ()  # of the tube, as far as they are known
+
+    def follows(self, held: bool) -> bool:
+        return held
+
+    def is_there(self, now_ns: int) -> bool:
+        return self._stream.is_fresh(now_ns)
+
+    def next(self, now_ns: int, periods: int) -> Desired:
+        limits, angles = self.shaper.limits, self.shaper.position
+        asked, seconds = self._stream.rate(now_ns), periods * _TICK_S
+        # After a stall it begins from rest, as the shaper does.
+        before = self.shaper.velocity if seconds <= limits.longest_period else (0.0,) * len(asked)
+        seconds = min(seconds, limits.longest_period)
+        ends = list(zip(limits.low, limits.high, strict=True))
+        if self.ranges:
+            self._cut(self.ranges, _gone(angles, asked, seconds), asked)
+            ends = [
+                (r.keep(low, 0.0)[0], r.keep(high, 0.0)[0])
+                for r, (low, high) in zip(self.ranges, ends, strict=True)
+            ]
+        speeds = tuple(
+            bounded_speed(speed, was, (angle - low, high - angle), limits.acceleration, seconds)
+            for speed, was, angle, (low, high) in zip(asked, before, angles, ends, strict=True)
+        )
+        return Desired(_gone(angles, speeds, seconds), speeds)
+
+
+def _gone(angles: Angles, speeds: Angles, seconds: float) -> Angles:
+    return tuple(angle + speed * seconds for angle, speed in zip(angles, speeds, strict=True))
+
+
 class MasterMotion:
     """Desired bending of J joints by one source or none, from the measured pose on.
 
@@ -150,6 +192,9 @@ class MasterMotion:
             self._limits.low,
             self._limits.high,
             settings=HandleSettings(rig.handle.resolution, timeout=rig.timeouts.handle),
+        )
+        self.velocities = VelocityStream(
+            len(JOINTS), facts.hand_speed, rig.instrument.section_length
         )
         self.source: MotionSource | None = None
         self.ranges: tuple[BendingRange, ...] = ()
@@ -172,6 +217,10 @@ class MasterMotion:
         """Follow the handle, `scale` rad of the slave for one of the handle's."""
         self._take(FollowedHandle(self._hand_limits, self.handle, scale))
 
+    def obey_velocities(self) -> None:
+        """Go as fast as another program commands; see :class:`CommandedVelocity`."""
+        self._take(CommandedVelocity(self._hand_limits, self.velocities, self.cut))
+
     def leave(self) -> None:
         """Move the slave no more."""
         self._take(None)
@@ -184,6 +233,22 @@ class MasterMotion:
         """Stop moving: whatever comes next begins at the measured pose."""
         self.moving = False
         self.handle.release()
+        self.velocities.end()
+
+    @property
+    def where(self) -> Angles | None:
+        """Bending (J,) in rad that is commanded or, at rest, measured; None where unknown."""
+        return self.source.shaper.position if self.source and self.moving else self._bending()
+
+    def velocities_ended(self, now_ns: int) -> bool:
+        """Whether velocities have fallen silent that moved the slave, and it stands still."""
+        source = self.source
+        return (
+            self.moving
+            and isinstance(source, CommandedVelocity)
+            and not source.is_there(now_ns)
+            and not any(source.shaper.velocity)
+        )
 
     def take_handle(self, stamp_ns: int, position: Angles, now_ns: int) -> None:
         """Take a sample of the handle (J,) in rad, and notice one that moves unfollowed."""
@@ -211,11 +276,13 @@ class MasterMotion:
         """
         followed, source = self.handle.follow(tick_ns), self.source
         if source is None or not (free and source.follows(held)):
-            if self.moving:
+            if self.moving or self.velocities.is_fresh(now_ns):
                 self.rest()
             return None
         if isinstance(source, FollowedHandle):
             source.followed = None if followed is None else Desired(*followed)
+        if isinstance(source, CommandedVelocity):
+            source.ranges = self.ranges
         if not (self.moving or self._begins(source, now_ns)):
             return None
         wanted = source.next(now_ns, periods)

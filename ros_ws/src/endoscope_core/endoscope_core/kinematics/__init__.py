@@ -15,14 +15,17 @@ from endoscope_core.kinematics.straight_registration import (
     StraightRegistration,
     register_straight,
 )
+from endoscope_core.kinematics.tip_velocity import TipVelocity, bending_rate
 
 __all__ = [
     'Hinge',
     'RegistrationError',
     'StraightRegistration',
+    'TipVelocity',
     'Transform',
     'Vertebrae',
     'bending_from_orientation',
+    'bending_rate',
     'centre_line',
     'register_straight',
     'robot_description',

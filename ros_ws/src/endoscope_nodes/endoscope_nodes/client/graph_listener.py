@@ -30,7 +30,12 @@ EVENTS = 'recorder: events'
 WATCH = 'watch: rig'
 MASTER = f'{names.MASTER_NODE}: commands'
 LOCK_STEP = f'{names.CLOCK_NODE}: lock-step'
-COMMANDS = ('compensator: commands', 'compensator: calibration commands', 'motor_driver: commands')
+COMMANDS = (
+    'master: velocities',
+    'compensator: commands',
+    'compensator: calibration commands',
+    'motor_driver: commands',
+)
 # A loop that reads as seldom as this still hears every word.
 _HEARD = profile(Qos(200))
 _HEARD_LATCHED = profile(Qos(200, latched=True))

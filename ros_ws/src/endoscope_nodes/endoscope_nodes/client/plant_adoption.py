@@ -13,7 +13,6 @@ from endoscope_core.calibration.order_feedback import OrderState
 from endoscope_core.errors import FileError
 from endoscope_core.safety import AdoptionCode, BendingRange
 from endoscope_nodes import names
-from endoscope_nodes.client.calibration_result import Reach
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import PATIENCE_S, GraphError
 from endoscope_nodes.runtime.diagnostics import (

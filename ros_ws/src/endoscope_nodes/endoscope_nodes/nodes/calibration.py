@@ -49,9 +49,9 @@ from endoscope_nodes.safety.streams import StreamWatch
 
 
 class CalibrationNode(EndoscopeNode):
-    """Serves ``calibration/run`` and the ``home`` command; publishes ``calibration/result``.
+    """Serves ``calibration/run``, ``slave/home`` and ``home``; publishes ``calibration/result``.
 
-    The service answers at once, with the reason if it refuses. How far an order is follows on
+    A service answers at once, with the reason if it refuses. How far an order is follows on
     ``calibration/feedback``, the result on its topic, and as numbers for programs that plot.
     Where an order is aborted the commands stop, the slave holds or goes back to the master by a
     ramp, and the result says why. Tensions unlike any known are refused: the result names no
@@ -90,7 +90,8 @@ class CalibrationNode(EndoscopeNode):
         JointSubscription(self, names.WIRES_MEASURED, names.WIRES, self._on_wires, SENSOR_ASKED)
         JointSubscription(self, names.SLAVE_MEASURED, names.JOINTS, self._on_bending, SENSOR_ASKED)
         self.create_subscription(String, names.STATE_COMMAND, self._on_state_command, EVENT)
-        self.serve(names.CALIBRATION_RUN, self._calibrate)
+        self.serve(names.CALIBRATION_RUN, lambda: self._serve(CALIBRATE))
+        self.serve(names.SLAVE_HOME, lambda: self._serve(HOME))
         self.diagnostics.add('procedure', self._report)
         self.ticker.add(self._on_tick)
 
@@ -99,8 +100,8 @@ class CalibrationNode(EndoscopeNode):
         """Whether the slave is being moved for a calibration or home."""
         return self.orders.order is not None
 
-    def _calibrate(self) -> tuple[bool, str]:
-        refusal = self._begin(CALIBRATE)
+    def _serve(self, order: str) -> tuple[bool, str]:
+        refusal = self._begin(order)
         return not refusal, refusal or f'begun; {names.CALIBRATION_FEEDBACK} says how it fares'
 
     def _on_state_command(self, message: String) -> None:

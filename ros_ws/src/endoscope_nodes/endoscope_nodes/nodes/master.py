@@ -1,4 +1,4 @@
-"""The operator's side: plays a motion, or follows the handle while the clutch is held."""
+"""The operator's side: plays a motion, or follows a handle or velocities by the clutch."""
 
 from pathlib import Path
 
@@ -8,7 +8,8 @@ from sensor_msgs.msg import Joy
 
 from endoscope_core.choices import FOLLOW_THE_HANDLE
 from endoscope_core.control import HandleRefusal
-from endoscope_core.control.master_motion import MasterMotion, PlayedMotion
+from endoscope_core.control.master_motion import CommandedVelocity, MasterMotion, PlayedMotion
+from endoscope_core.control.velocity_stream import WATCHDOG_NS
 from endoscope_core.errors import FileError
 from endoscope_core.signals.sampled_motion import SampledMotion, load_command_file, sample_motion
 from endoscope_nodes import names
@@ -23,8 +24,9 @@ from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import COMMAND, EVENT, SENSOR_ASKED
 from endoscope_nodes.runtime.streams import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.runtime.ticker import TICK_S
-from endoscope_nodes.safety.sessions import ClutchWatch, SessionWatch
+from endoscope_nodes.safety.sessions import TURN_S, ClutchWatch, SessionWatch
 from endoscope_nodes.safety.streams import StreamWatch
+from endoscope_nodes.safety.velocities import VelocityCommands
 
 WAITING = 'goes on while the clutch is held'
 """Message of the diagnostics while a motion waits for the operator's hand."""
@@ -35,8 +37,9 @@ class MasterNode(EndoscopeNode):
 
     It moves the slave only in a motion session, and every time from the measured pose; see
     :class:`MasterMotion`. While a calibration or a way home has the slave, the master rests. With
-    source ``none`` it leaves both topics to somebody else. With ``hold_to_play`` it leaves him the
-    clutch alone, and plays while that is held.
+    source ``none`` it leaves both topics to somebody else, or makes commands of the velocities that
+    another program sends. With ``hold_to_play`` it leaves him the clutch alone, and plays while
+    that is held. Velocities that fall silent while the clutch is held end the session.
     """
 
     def __init__(self, context: NodeContext) -> None:
@@ -65,10 +68,19 @@ class MasterNode(EndoscopeNode):
             self._on_handle,
         )
         self._clutch = ClutchWatch(self, self._session)
+        self._velocities = VelocityCommands(
+            self,
+            self._session,
+            self.motion.velocities,
+            lambda: self._clutch.held,
+            lambda: self.motion.where,
+            self._other_source,
+        )
         self._session.results(names.CALIBRATION_RESULT, self._on_result)
         self._session.results(names.COMPENSATOR_PLANT, self._on_plant)
         self._on_parameters(self._settings)
         self.diagnostics.add('commands', self._report)
+        self.ticker.every(TURN_S, self._find_velocities)
         self.ticker.add(self._on_tick)
 
     def _on_parameters(self, parameters: MasterParameters) -> None:
@@ -100,6 +112,21 @@ class MasterNode(EndoscopeNode):
         elif self._clutch_out is not None and not speaks:
             self.destroy_publisher(self._clutch_out)
             self._clutch_out = None
+
+    def _other_source(self) -> str:
+        source = self._settings.source
+        return (
+            '' if source == 'none' else f"velocities are sent while the master's source is {source}"
+        )
+
+    def _find_velocities(self) -> None:
+        """Obey velocities while they have a sender; one that goes is left by the watchdog first."""
+        obeys = isinstance(self.motion.source, CommandedVelocity)
+        if self._settings.source == 'none' and not self.motion.moving:
+            alone = self._velocities.alone
+            if alone != obeys:
+                (self.motion.obey_velocities if alone else self.motion.leave)()
+                self._own_topics()
 
     def _on_handle(self, sample: JointSample) -> None:
         self._handle_ns = self.ticker.hand_ns()
@@ -137,6 +164,8 @@ class MasterNode(EndoscopeNode):
         now, timeouts = self.ticker.hand_ns(), self.rig.timeouts
         if now - self._handle_ns > timeouts.handle_ns:
             self.motion.handle.lose()
+        if now - self._velocities.heard_ns > WATCHDOG_NS:
+            self.motion.velocities.lose()
         desired = self.motion.next(
             self.ticker.monotonic_of(stamp_ns),
             self.ticker.monotonic_ns(),
@@ -149,6 +178,12 @@ class MasterNode(EndoscopeNode):
             self._publish_clutch(stamp_ns)
         if desired is not None and self._commands is not None:
             self._commands.publish(stamp_ns, *desired.position, *desired.velocity)
+        if self.motion.velocities_ended(self.ticker.monotonic_ns()):
+            last = self.motion.velocities.gate.last_reason
+            refused = f' ({last})' if last else ''
+            self._session.leave(
+                f'{self._velocities.topic} ended while the clutch was held{refused}'
+            )
 
     def _unheeded(self) -> str:
         """Say that a handle is not followed, if somebody moves it or holds its clutch."""

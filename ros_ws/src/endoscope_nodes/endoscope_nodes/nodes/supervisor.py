@@ -6,7 +6,13 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.time import Time
 from std_msgs.msg import Header, String
 
-from endoscope_core.safety import Answer, OperatingState, OperatingStateMachine, TensionGuard
+from endoscope_core.safety import (
+    Answer,
+    OperatingState,
+    OperatingStateMachine,
+    StateCommand,
+    TensionGuard,
+)
 from endoscope_core.safety.motion_session import HEARTBEAT_S
 from endoscope_nodes import names
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report
@@ -16,6 +22,7 @@ from endoscope_nodes.runtime.qos import EVENT, RESULT, SENSOR_ASKED
 from endoscope_nodes.runtime.streams import JointSample, JointSubscription
 from endoscope_nodes.safety.sessions import SESSION_REPORT, senders_in_words
 from endoscope_nodes.safety.streams import StreamWatch
+from endoscope_nodes.safety.velocities import rivals_in_motion
 from endoscope_nodes.topics import TOPICS
 
 # Subcomponents whose errors forbid motion; their nodes report them at once.
@@ -24,6 +31,8 @@ _VITAL = ('motor_driver: device', 'load_cells: cells')
 
 class SupervisorNode(EndoscopeNode):
     """Publishes ``slave/operating_state`` and ``slave/motion_session``, obeys state commands.
+
+    ``slave/stop`` is ``pause`` as a service, which is done with where nothing can move.
 
     An ``enable`` opens a motion session, whose name it repeats at 20 Hz; a fault, ``disable`` and
     ``pause`` end it.  Faults are a wire over its ceiling, silent motors or load cells, an error of
@@ -51,7 +60,10 @@ class SupervisorNode(EndoscopeNode):
         self._wires = StreamWatch(self.ticker, names.WIRES_MEASURED)
         self._streams = self._motor, self._wires
         JointSubscription(self, names.WIRES_MEASURED, names.WIRES, self._on_wires, SENSOR_ASKED)
-        self.create_subscription(String, names.STATE_COMMAND, self._on_command, EVENT)
+        self.create_subscription(
+            String, names.STATE_COMMAND, lambda message: self._command(message.data), EVENT
+        )
+        self.serve(names.SLAVE_STOP, self._stop)
         self.create_subscription(DiagnosticArray, names.DIAGNOSTICS, self._on_diagnostics, EVENT)
         self.diagnostics.add('operating state', self._report)
         self.ticker.every(HEARTBEAT_S, self._beat)
@@ -83,9 +95,14 @@ class SupervisorNode(EndoscopeNode):
             Header(stamp=Time(nanoseconds=now).to_msg(), frame_id=self.machine.session)
         )
 
-    def _on_command(self, message: String) -> None:
+    def _stop(self) -> tuple[bool, str]:
+        if self.machine.session:
+            self._command(StateCommand.PAUSE)
+        return True, str(self.machine.state)
+
+    def _command(self, text: str) -> None:
         before, now = self.machine.state, self.ticker.now_ns()
-        answer = self.machine.command(message.data, now)
+        answer = self.machine.command(text, now)
         if not answer.accepted:
             self._refused, self._refused_ns = answer, now
             self.get_logger().warning(answer.reason)
@@ -118,6 +135,7 @@ class SupervisorNode(EndoscopeNode):
         for topic in self._watched:
             rivals = self.count_publishers(topic) > 1
             self._note(f'senders of {topic}', senders_in_words(self, topic) if rivals else '')
+        self._note('senders of motion', rivals_in_motion(self))
 
     def _note(self, name: str, trouble: str) -> None:
         if not trouble:
