@@ -22,8 +22,7 @@ from short_bags import PLANT, one_joint, write_short_bag
 from endoscope_core.physics import EffectSpec, JointParameters, PlantDescription
 from endoscope_core.physics.description import TermSpec
 from endoscope_explain import many_bags, pipeline
-from endoscope_explain.case import ExplainedCase
-from endoscope_explain.pipeline import Sources
+from endoscope_explain.case import ExplainedCase, Sources
 from endoscope_explain.recording import RigRecording
 
 WORKSPACE = Path(__file__).parents[1] / 'ros_ws'

@@ -15,7 +15,8 @@ from endoscope_bringup.cli import main
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import EffectSpec, PlantDescription, load_plant, save_plant
 from endoscope_core.rig import shipped_rig
-from endoscope_explain.pipeline import Sources, read_inputs
+from endoscope_explain.case import Sources
+from endoscope_explain.pipeline import read_inputs
 from endoscope_explain.report.html_page import html_page
 
 TIME = np.arange(0.0, 1.0, 1e-3)
@@ -294,7 +295,7 @@ def test_several_recordings_are_explained_in_one_call(corpus, tmp_path):
     other.write_bytes(corpus.bag('sound').read_bytes())
     both = [corpus.bag('sound'), endoscope_explain.read(other)]
     found = endoscope_explain.explain(both, one_joint(), quick=True)
-    assert [one.case.recording.name for one in found] == ['sound', 'other']
+    assert [one.recording.name for one in found] == ['sound', 'other']
     assert [one.verdict for one in found] == ['consistent', 'consistent']
     alone = endoscope_explain.explain(both[0], one_joint(), quick=True)
     assert found[0].report | {'runtime_s': 0} == alone.report | {'runtime_s': 0}
@@ -313,10 +314,10 @@ def test_another_recording_in_degrees_is_used_as_corrected_and_that_is_said(corp
         bag, one_joint(), quick=True, progress=told.append, validate=mistaken
     )
     said = f'{angle.name} is 57.3 times what the plant can give: in deg'
-    for text in (repr(found), html_page(found.case), '\n'.join(told)):
+    for text in (repr(found), html_page(found), '\n'.join(told)):
         assert said in text
     assert found.verdict == 'consistent'
-    assert found.case.validation['refitted'][angle.name].ratio < 1.2
+    assert found.validation['refitted'][angle.name].ratio < 1.2
     inputs = read_inputs(Sources(bag, one_joint(), baseline=mistaken.path))
     assert inputs.baseline.bending.values[:, 0] == pytest.approx(angle.values)
     assert said in inputs.mistakes_of_others[0]

@@ -11,10 +11,10 @@ from endoscope_bringup.demo.live_graph import LiveGraph
 from endoscope_core.physics import PlantDescription
 from endoscope_core.rig import shipped_rig
 from endoscope_explain.audit import audit_recording
+from endoscope_explain.case import Sources
 from endoscope_explain.explanation import Verdict
 from endoscope_explain.many_bags import explained_case
 from endoscope_explain.observe.predicted_signals import view
-from endoscope_explain.pipeline import Sources
 from endoscope_explain.recording import SETPOINT, recording_from_bag
 from endoscope_nodes.runtime.private_domain import private_domain
 

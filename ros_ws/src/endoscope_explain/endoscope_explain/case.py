@@ -1,14 +1,16 @@
 """One recording, audited and explained: what every output is made from."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.effect import Stage
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.audit import AuditReport
 from endoscope_explain.decide.conclusions import has_changed, verdict
+from endoscope_explain.decide.given_physics import GivenJoints
 from endoscope_explain.explanation import (
     ChannelFit,
     Explanation,
@@ -17,8 +19,38 @@ from endoscope_explain.explanation import (
     Verdict,
 )
 from endoscope_explain.fit.free_parameters import nominal_number
-from endoscope_explain.options import BAND
+from endoscope_explain.options import Options
 from endoscope_explain.recording import RigRecording
+
+
+@dataclass(frozen=True)
+class Sources(Options):
+    """What one explanation is made from."""
+
+    bag: Path  # the recording to explain
+    plant: PlantDescription  # the simulation that an engineer has
+    given: GivenJoints | None = None  # the physics of each joint, if it is not to be searched
+    # By joint, names that other recordings of the rig gave or left open.
+    known: Mapping[str, Collection[str]] = field(default_factory=dict)
+    plant_file: Path | None = None  # where the plant was read from
+    command: str = ''  # as it was typed
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """The sources, read and audited."""
+
+    sources: Sources
+    audit: AuditReport
+    # As audited.
+    baseline: RigRecording | None = None
+    validation: RigRecording | None = None
+    mistakes_of_others: tuple[str, ...] = ()  # what somebody took wrongly in these two, in words
+
+    @property
+    def plant(self) -> PlantDescription:
+        """Return the plant as described, with the recorded joints only."""
+        return self.sources.plant.of_joints(self.audit.recording.joints)
 
 
 def combined_effects(explanation: Explanation, audit: AuditReport) -> tuple[NamedEffect, ...]:
@@ -153,8 +185,7 @@ class ChainCut:
 class ExplainedCase:
     """All that is known about one recording."""
 
-    recording: RigRecording  # as audited
-    audit: AuditReport
+    inputs: Inputs
     explanation: Explanation  # the engine's own words
     verdict: Verdict  # of engine and audit together
     effects: tuple[NamedEffect, ...]  # of engine and audit together, most certain first
@@ -164,16 +195,26 @@ class ExplainedCase:
     ladder: Ladder  # on what was held out of the recording
     # on the second recording; empty if none was given
     validation: Ladder = field(default_factory=dict)
-    validation_name: str = ''  # empty if none was given
-    baseline_name: str = ''  # empty if none was given
-    # What was mistaken in the baseline or the second recording.
-    mistakes_of_others: tuple[str, ...] = ()
     next_experiment: NextExperiment | None = None
     # Whether the refitted plant does better when the measured motor drives it.
     cuts: tuple[ChainCut, ...] = ()
-    band: float = BAND  # relative tolerance of the plant's parameters
     provenance: Provenance | None = None
     runtime_s: float = 0.0
+
+    @property
+    def audit(self) -> AuditReport:
+        """What the audit found in the recording."""
+        return self.inputs.audit
+
+    @property
+    def recording(self) -> RigRecording:
+        """The recording, as audited."""
+        return self.audit.recording
+
+    @property
+    def validation_name(self) -> str:
+        """Name of the second recording; empty if none was given."""
+        return '' if self.inputs.validation is None else self.inputs.validation.name
 
     @property
     def rest(self) -> Verdict:

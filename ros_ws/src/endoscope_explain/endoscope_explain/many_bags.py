@@ -11,8 +11,8 @@ from typing import Any
 from endoscope_core.atomic_output import atomic_directory, require_free_directory
 from endoscope_core.errors import InputError
 from endoscope_core.workers import worker_pool
-from endoscope_explain.case import ExplainedCase
-from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
+from endoscope_explain.case import ExplainedCase, Sources
+from endoscope_explain.pipeline import Progress, explain_case, read_inputs
 from endoscope_explain.report.sentences import terminal_text, verdict_sentence
 from endoscope_explain.report.writing import REPORT_HTML, provenance, write_report
 from endoscope_explain.shared_physics import physics_of_all
@@ -48,8 +48,7 @@ def explained_case(sources: Sources, progress: Progress | None = None) -> Explai
         report(f'found: {verdict_sentence(case)}')
 
     case = explain_case(inputs, progress=progress, answered=answered)
-    made_from = provenance(sources.bag, sources.plant_file, sources.command)
-    return replace(case, provenance=made_from)
+    return replace(case, provenance=provenance(sources))
 
 
 def explained_cases(

@@ -128,7 +128,7 @@ def fitted_laws(case: ExplainedCase, question: OpenQuestion) -> dict[str, PlantD
     for name in others:
         if len(laws) == MOST_LAWS:
             break
-        law = _law(bare, observation, name, case.band)
+        law = _law(bare, observation, name, case.inputs.sources.band)
         if law is not None:
             laws[name] = law
     return laws

@@ -1,8 +1,8 @@
 """From bags to an explained case: read, audit, explain, locate, judge, propose."""
 
 import time
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Collection
+from dataclasses import replace
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
@@ -13,13 +13,14 @@ from endoscope_explain.audit import AuditReport, audit_recording
 from endoscope_explain.case import (
     ChainCut,
     ExplainedCase,
+    Inputs,
     Mismatch,
+    Sources,
     combined_effects,
     combined_verdict,
     improved_plant,
 )
 from endoscope_explain.compare import confirmed_by, ladders
-from endoscope_explain.decide.given_physics import GivenJoints
 from endoscope_explain.design import propose, what_is_asked
 from endoscope_explain.explain_recording import Progress, explain_recording
 from endoscope_explain.explanation import Explanation, Verdict
@@ -32,7 +33,6 @@ from endoscope_explain.locate.locating import (
     locate_parameters,
     locate_unknown,
 )
-from endoscope_explain.options import Options
 from endoscope_explain.recording import (
     RigRecording,
     recording_from_bag,
@@ -40,36 +40,6 @@ from endoscope_explain.recording import (
 )
 
 Engine = Callable[..., Explanation]
-
-
-@dataclass(frozen=True)
-class Sources(Options):
-    """What one explanation is made from."""
-
-    bag: Path  # the recording to explain
-    plant: PlantDescription  # the simulation that an engineer has
-    given: GivenJoints | None = None  # the physics of each joint, if it is not to be searched
-    # By joint, names that other recordings of the rig gave or left open.
-    known: Mapping[str, Collection[str]] = field(default_factory=dict)
-    plant_file: Path | None = None  # where the plant was read from
-    command: str = ''  # as it was typed
-
-
-@dataclass(frozen=True)
-class Inputs:
-    """The sources, read and audited."""
-
-    sources: Sources
-    audit: AuditReport
-    # As audited.
-    baseline: RigRecording | None = None
-    validation: RigRecording | None = None
-    mistakes_of_others: tuple[str, ...] = ()  # what somebody took wrongly in these two, in words
-
-    @property
-    def plant(self) -> PlantDescription:
-        """Return the plant as described, with the recorded joints only."""
-        return self.sources.plant.of_joints(self.audit.recording.joints)
 
 
 def read_inputs(sources: Sources) -> Inputs:
@@ -149,20 +119,14 @@ def explain_case(
         explanation = replace(explanation, effects=confirmed_by(validation, explanation))
     if explanation.fit:
         report('locating what was found')
-    recording = audit.recording
     case = ExplainedCase(
-        recording=recording,
-        audit=audit,
+        inputs=inputs,
         explanation=explanation,
         verdict=combined_verdict(explanation, audit),
         effects=combined_effects(explanation, audit),
         places=(),
         plant=with_unrecorded(plant, sources.plant),
         ladder={},
-        validation_name='' if validation is None else validation.name,
-        baseline_name='' if inputs.baseline is None else inputs.baseline.name,
-        mistakes_of_others=inputs.mistakes_of_others,
-        band=sources.band,
     )
     case = replace(case, places=_places(case), cuts=_cuts(case))
     if answered is not None:

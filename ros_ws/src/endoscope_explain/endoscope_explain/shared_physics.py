@@ -5,6 +5,7 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
+from endoscope_explain.case import Sources
 from endoscope_explain.decide.decision import found_together
 from endoscope_explain.decide.given_physics import (
     GivenJoints,
@@ -15,7 +16,7 @@ from endoscope_explain.decide.given_physics import (
 from endoscope_explain.fit.nominal import ReferenceFits, with_references
 from endoscope_explain.fit.pooled import judged_alone
 from endoscope_explain.observe.observation import observe, with_held_noise
-from endoscope_explain.pipeline import Sources, read_inputs, refuse_other_joints
+from endoscope_explain.pipeline import read_inputs, refuse_other_joints
 from endoscope_explain.search.levels import search
 
 

@@ -12,7 +12,8 @@ from itertools import pairwise
 import numpy as np
 
 from endoscope_explain.audit.finding import AuditReport, Finding
-from endoscope_explain.pipeline import Inputs, refuse_other_joints
+from endoscope_explain.case import Inputs
+from endoscope_explain.pipeline import refuse_other_joints
 from endoscope_explain.recording import Array, Restart, RigRecording, Series
 
 APART_S = 1.0

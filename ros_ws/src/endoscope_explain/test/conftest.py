@@ -12,6 +12,7 @@ from endoscope_core.physics.sensing import SensorModel
 from endoscope_core.physics.simulator import simulate
 from endoscope_core.rig import shipped_rig
 from endoscope_explain.audit import audit_recording
+from endoscope_explain.case import Inputs, Sources
 from endoscope_explain.explanation import (
     Estimate,
     Explanation,
@@ -21,7 +22,7 @@ from endoscope_explain.explanation import (
     Verdict,
 )
 from endoscope_explain.observe.predicted_signals import fits_by, view
-from endoscope_explain.pipeline import Inputs, Sources, explain_case
+from endoscope_explain.pipeline import explain_case
 from endoscope_explain.recording import RigRecording, Series
 
 # Tests import each other's recordings by name.

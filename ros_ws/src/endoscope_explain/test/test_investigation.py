@@ -19,6 +19,7 @@ from endoscope_core.signals import hold, move, sequence
 from endoscope_core.signals.command_file import CommandTable, read_command_file
 from endoscope_explain import prediction_set
 from endoscope_explain.audit import audit_recording
+from endoscope_explain.case import Inputs, Sources
 from endoscope_explain.explanation import Verdict
 from endoscope_explain.investigation import index_page
 from endoscope_explain.investigation.investigation import Investigation, investigate
@@ -30,7 +31,7 @@ from endoscope_explain.investigation.motions import (
     require_allowed,
 )
 from endoscope_explain.observe.revisits import EVERY_S, LEAST_SHARE, seen_before, strokes
-from endoscope_explain.pipeline import Inputs, Sources, explain_case
+from endoscope_explain.pipeline import explain_case
 from endoscope_explain.prediction_set import Contest
 from endoscope_explain.report.visited_once import once_only
 from endoscope_explain.takes import inputs_joined

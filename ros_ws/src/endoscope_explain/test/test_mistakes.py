@@ -8,9 +8,10 @@ import pytest
 
 from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_explain.audit import audit_recording
+from endoscope_explain.case import Inputs, Sources
 from endoscope_explain.explanation import Explanation, Verdict
 from endoscope_explain.observe.predicted_signals import fits_by, view
-from endoscope_explain.pipeline import Inputs, Sources, explain_case
+from endoscope_explain.pipeline import explain_case
 from endoscope_explain.report.html_page import html_page
 from endoscope_explain.report.sentences import terminal_text
 from endoscope_explain.report.writing import write_report

@@ -1,4 +1,5 @@
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -7,7 +8,7 @@ from endoscope_core.physics.description import EffectSpec, JointParameters, Plan
 from endoscope_core.rig import shipped_rig
 from endoscope_explain import design, operator_changes
 from endoscope_explain.audit import audit_recording
-from endoscope_explain.case import ExplainedCase
+from endoscope_explain.case import ExplainedCase, Inputs, Sources
 from endoscope_explain.design import Asking, propose, what_is_asked
 from endoscope_explain.experiment_motions import library
 from endoscope_explain.explanation import Explanation, NamedEffect, Verdict
@@ -53,8 +54,7 @@ def case_of(recording, plant, *names, **changed):
         fit={},
     )
     return ExplainedCase(
-        recording=audit.recording,
-        audit=audit,
+        inputs=Inputs(Sources(Path('rig'), described), audit),
         explanation=explanation,
         verdict=Verdict.MISSING_PHYSICS,
         effects=(effect,),

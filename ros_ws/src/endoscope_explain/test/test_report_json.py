@@ -112,7 +112,9 @@ def test_the_tolerance_is_the_one_that_was_asked_for(stribeck_case, band, inside
     explanation = dataclasses.replace(
         stribeck_case.explanation, parameters={'bend_x': {'pretension': estimate}}
     )
-    case = dataclasses.replace(stribeck_case, explanation=explanation, band=band)
+    asked = dataclasses.replace(stribeck_case.inputs.sources, band=band)
+    inputs = dataclasses.replace(stribeck_case.inputs, sources=asked)
+    case = dataclasses.replace(stribeck_case, explanation=explanation, inputs=inputs)
     assert report_mapping(case)['parameters']['bend_x']['pretension']['in_band'] is inside
 
 

@@ -8,9 +8,10 @@ import pytest
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.rig import shipped_rig
+from endoscope_explain.case import Inputs, Sources
 from endoscope_explain.compare import confirmed_by, ladders
 from endoscope_explain.explanation import Verdict
-from endoscope_explain.pipeline import Inputs, Sources, explain_case
+from endoscope_explain.pipeline import explain_case
 from endoscope_explain.report.html_page import html_page
 from endoscope_explain.report.sentences import terminal_text
 from endoscope_explain.report.writing import report_mapping

@@ -10,9 +10,9 @@ from endoscope_bags.errors import BagError
 from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_core.rig import shipped_rig
 from endoscope_explain.audit.finding import AuditReport, Finding, Severity
+from endoscope_explain.case import Inputs, Sources
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.observe.predicted_signals import fits_by, simulate_rig, view
-from endoscope_explain.pipeline import Inputs, Sources
 from endoscope_explain.takes import inputs_joined, recordings_joined
 
 GEAR = shipped_rig().joints.gear

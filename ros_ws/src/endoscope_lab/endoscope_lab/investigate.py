@@ -20,7 +20,7 @@ from endoscope_core.physics.plant_file import save_plant
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals.command_file import CommandTable, read_command_file
 from endoscope_explain.audit import audit_recording
-from endoscope_explain.case import ExplainedCase
+from endoscope_explain.case import ExplainedCase, Inputs, Sources
 from endoscope_explain.experiment_motions import SAMPLE_S, as_played, library
 from endoscope_explain.explanation import Explanation
 from endoscope_explain.investigation.investigation import (
@@ -31,7 +31,7 @@ from endoscope_explain.investigation.investigation import (
 )
 from endoscope_explain.investigation.log import Stop
 from endoscope_explain.investigation.motions import RigMotion, commissioning
-from endoscope_explain.pipeline import Inputs, Sources, explain_case
+from endoscope_explain.pipeline import explain_case
 from endoscope_explain.recording import RigRecording
 from endoscope_explain.takes import APART_S, inputs_joined
 from endoscope_lab.bench import keep_row, rows_so_far, side_by_side, table_head, table_row

@@ -8,8 +8,9 @@ import pytest
 from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.audit import audit_recording
+from endoscope_explain.case import Inputs, Sources
 from endoscope_explain.explanation import Explanation, Verdict
-from endoscope_explain.pipeline import Inputs, Sources, explain_case
+from endoscope_explain.pipeline import explain_case
 from endoscope_lab.mistakes import drawing
 from endoscope_lab.mistakes.mistake import MISTAKES, is_reported
 

@@ -43,8 +43,8 @@ def run(args: argparse.Namespace) -> int:
     """Explain and write; return 0."""
     from endoscope_core.physics import load_plant
     from endoscope_core.rig import load_rig
+    from endoscope_explain.case import Sources
     from endoscope_explain.many_bags import explain_bags, summary
-    from endoscope_explain.pipeline import Sources
 
     plant = load_plant(args.plant)
     given = {each.name: getattr(args, each.name) for each in fields(Options)}

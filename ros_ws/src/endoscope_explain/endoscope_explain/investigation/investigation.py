@@ -14,7 +14,7 @@ from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.plant_file import load_plant, save_plant
 from endoscope_core.rig import Rig
 from endoscope_core.signals.command_file import write_command_file
-from endoscope_explain.case import ExplainedCase
+from endoscope_explain.case import ExplainedCase, Sources
 from endoscope_explain.design import is_wide, propose, what_is_asked
 from endoscope_explain.explanation import NamedEffect, Verdict
 from endoscope_explain.investigation import log as logs
@@ -28,7 +28,7 @@ from endoscope_explain.investigation.motions import (
 from endoscope_explain.investigation.tracking import PlayThrough, held_out, with_tracking
 from endoscope_explain.open_questions import open_questions
 from endoscope_explain.operator_changes import what_would_decide
-from endoscope_explain.pipeline import Progress, Sources, explain_case, read_inputs
+from endoscope_explain.pipeline import Progress, explain_case, read_inputs
 from endoscope_explain.prediction_set import OTHER_NUMBERS, Posterior
 from endoscope_explain.report.left_open import in_words
 from endoscope_explain.report.numbers import shown

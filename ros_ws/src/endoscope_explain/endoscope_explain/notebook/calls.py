@@ -2,7 +2,7 @@
 
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, overload
@@ -16,14 +16,14 @@ from endoscope_core.physics import PlantDescription, load_plant, recording_fault
 from endoscope_core.physics.packing import pack
 from endoscope_core.rig import Rig, load_rig
 from endoscope_explain.answer_bag import write_answer
-from endoscope_explain.case import ExplainedCase
-from endoscope_explain.explanation import NamedEffect, NominalEstimate
+from endoscope_explain.case import ExplainedCase, Sources
+from endoscope_explain.explanation import NominalEstimate
 from endoscope_explain.many_bags import explained_cases
 from endoscope_explain.notebook.arguments import SCRATCH, checked, takes
 from endoscope_explain.notebook.arrays import commands_from
 from endoscope_explain.notebook.signals import Signals, read
 from endoscope_explain.options import Options
-from endoscope_explain.pipeline import Progress, Sources
+from endoscope_explain.pipeline import Progress
 from endoscope_explain.report.sentences import terminal_text
 from endoscope_explain.report.writing import report_mapping, write_report
 
@@ -33,42 +33,22 @@ Seconds = Bag | Sequence[Bag | None] | None
 RigGiven = str | Path | Rig | None
 
 
-@dataclass(frozen=True)
-class Explained:
+class Explained(ExplainedCase):
     """An explained recording; prints itself as the command does.
 
-    Attributes
-    ----------
-    case : ExplainedCase
-        Everything that is known about it.
+    Its `verdict` is a word of `report.json`, its `effects` are what the simulation left out, most
+    certain first, and its `plant` is the improved one, which `simulate` takes.
     """
-
-    case: ExplainedCase
-
-    @property
-    def verdict(self) -> str:
-        """One of the words of `report.json`, such as `missing_physics`."""
-        return str(self.case.verdict)
-
-    @property
-    def effects(self) -> tuple[NamedEffect, ...]:
-        """What the simulation left out, most certain first."""
-        return self.case.effects
 
     @property
     def parameters(self) -> Mapping[str, Mapping[str, NominalEstimate]]:
         """Refitted parameters of the plant, by joint and name."""
-        return self.case.explanation.parameters
-
-    @property
-    def plant(self) -> PlantDescription:
-        """The improved plant, which `simulate` takes."""
-        return self.case.plant
+        return self.explanation.parameters
 
     @cached_property
     def report(self) -> dict[str, Any]:
         """What `report.json` contains."""
-        return report_mapping(self.case)
+        return report_mapping(self)
 
     def save(self, folder: str | Path) -> Path:
         """Write report.json, report.html and plant.yaml to a new or empty folder; return it.
@@ -79,11 +59,11 @@ class Explained:
             There is something in it.
         """
         with atomic_directory(folder) as partial:
-            write_report(self.case, partial)
+            write_report(self, partial)
         return Path(folder)
 
     def __repr__(self) -> str:
-        return f'{self.case.recording.name}: {self.verdict}. {terminal_text(self.case)}'
+        return f'{self.recording.name}: {self.verdict}. {terminal_text(self)}'
 
 
 @checked
@@ -186,7 +166,7 @@ def explain(
         for one, second in zip(bags, seconds, strict=True)
     ]
     cases = explained_cases(sources, progress)
-    found = [Explained(case) for case in cases]
+    found = [Explained(**vars(case)) for case in cases]
     return found[0] if alone else found
 
 

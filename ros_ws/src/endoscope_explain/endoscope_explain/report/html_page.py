@@ -240,7 +240,7 @@ def _parameters(case: ExplainedCase) -> list[dict[str, Any]]:
     for joint, estimates in case.explanation.parameters.items():
         for name, e in estimates.items():
             _, _, factor = numbers.in_degrees(name, e.unit)
-            low, high = tolerance(name, e.nominal, case.band)
+            low, high = tolerance(name, e.nominal, case.inputs.sources.band)
             reach = f'{numbers.digits(factor * low)} … {numbers.digits(factor * high)}'
             rows.append(
                 {

@@ -156,7 +156,7 @@ def reservations(case: ExplainedCase) -> list[str]:
     sentences += [_doubt(case, effect) for effect in doubtful]
     unlike = (f for f in left_over if f.id == 'unlike_the_plant')
     sentences += [f'{_capital(finding.text)}. {_capital(finding.remedy)}.' for finding in unlike]
-    others = case.mistakes_of_others
+    others = case.inputs.mistakes_of_others
     sentences += [f'{_capital(other)}. It was used as corrected.' for other in others]
     if case.rest in (Verdict.CONSISTENT, Verdict.INSUFFICIENT_DATA):
         return sentences

@@ -19,6 +19,7 @@ from endoscope_explain.case import (
     Mismatch,
     NextExperiment,
     Provenance,
+    Sources,
 )
 from endoscope_explain.explanation import (
     Estimate,
@@ -57,6 +58,7 @@ KEYS = {
 def report_mapping(case: ExplainedCase) -> dict[str, Any]:
     """The content of report.json; ValueError if a number without a bound is not finite."""
     term, experiment = case.explanation.unknown, case.next_experiment
+    band = case.inputs.sources.band
     content = {
         'schema': SCHEMA,
         'verdict': str(case.verdict),
@@ -68,7 +70,7 @@ def report_mapping(case: ExplainedCase) -> dict[str, Any]:
             for joint in case.explanation.contests
         },
         'parameters': {
-            joint: {name: _nominal(name, e, case.band) for name, e in estimates.items()}
+            joint: {name: _nominal(name, e, band) for name, e in estimates.items()}
             for joint, estimates in case.explanation.parameters.items()
         },
         'fit': _ladder(case),
@@ -202,8 +204,9 @@ def _require_finite(content: object, where: str = '') -> None:
             _require_finite(value, f'{where}[{index}]')
 
 
-def provenance(bag: Path, plant: Path | None, command: str) -> Provenance:
+def provenance(sources: Sources) -> Provenance:
     """Note what a report is made from, now: the bag's files and the plant's by their hashes."""
+    bag, plant = sources.bag, sources.plant_file
     messages = sorted(p for p in bag.iterdir() if p.suffix != '.yaml') if bag.is_dir() else [bag]
     return Provenance(
         str(bag),
@@ -211,7 +214,7 @@ def provenance(bag: Path, plant: Path | None, command: str) -> Provenance:
         '' if plant is None else str(plant),
         '' if plant is None else _sha256(plant),
         version('endoscope_explain'),
-        command,
+        sources.command,
         datetime.now().astimezone().isoformat(timespec='seconds'),
     )
 

@@ -17,10 +17,10 @@ from endoscope_bags.recording import rig_record
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import load_plant
 from endoscope_core.physics.plant_file import plant_from_mapping, save_plant
-from endoscope_explain.case import ExplainedCase
+from endoscope_explain.case import ExplainedCase, Sources
 from endoscope_explain.investigation.tracking import Tracked
+from endoscope_explain.many_bags import explained_case
 from endoscope_explain.observe.predicted_signals import view
-from endoscope_explain.pipeline import Sources, explain_case, read_inputs
 from endoscope_explain.recording import (
     BENDING,
     COMMAND,
@@ -32,7 +32,7 @@ from endoscope_explain.recording import (
     wire_names,
 )
 from endoscope_explain.report.sentences import verdict_sentence
-from endoscope_explain.report.writing import PLANT_YAML, REPORT_HTML, provenance, write_report
+from endoscope_explain.report.writing import PLANT_YAML, REPORT_HTML, write_report
 from endoscope_lab.concealed.judge import Correctness, Law, judged, statements
 from endoscope_lab.proof import SLAVE, slave
 from endoscope_lab.proof.drawing import drawn
@@ -182,20 +182,16 @@ def explained(number: int, folder: Path, command: str) -> SealedAnswer:
     """Explain a rig from its recordings and the described plant, and write the report."""
     plant = load_plant(folder / PLANT)
     bag, second, file = (folder / name for name in (RECORDING, SECOND, PLANT))
-    sources = Sources(bag, plant, validate=second, quick=True, jobs=1, plant_file=file)
-    inputs = read_inputs(sources)
-    case = explain_case(inputs)
-    case = replace(case, provenance=provenance(sources.bag, sources.plant_file, command))
+    case = explained_case(
+        Sources(bag, plant, validate=second, quick=True, jobs=1, plant_file=file, command=command)
+    )
     (folder / REPORT).mkdir()
     write_report(case, folder / REPORT)
     explanation = case.explanation
-    plants = {
-        'nominal': explanation.nominal,
-        'refitted': explanation.refitted,
-        'augmented': case.plant,
-    }
-    assert inputs.validation is not None
-    seen = view(inputs.validation, plants)
+    plants = {'nominal': explanation.nominal, 'refitted': explanation.refitted}
+    plants['augmented'] = case.plant
+    assert case.inputs.validation is not None
+    seen = view(case.inputs.validation, plants)
     worst = max(seen.signals.values(), key=lambda s: np.mean(s.residual('refitted') ** 2))
     named = replace(explanation, verdict=case.verdict, effects=case.effects)
     misfit = partial(_misfit, case)
