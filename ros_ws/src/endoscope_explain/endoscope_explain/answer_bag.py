@@ -37,7 +37,7 @@ from endoscope_explain.recording import (
     BENDING,
     COMMAND,
     DESIRED,
-    INPUTS,
+    INPUT_TOPICS,
     MOTOR,
     WIRES,
     input_topic,
@@ -114,7 +114,7 @@ class BagCommands:
     @property
     def namespace(self) -> str:
         """Namespace of the topic, with the slash at its end."""
-        return reduce(str.removesuffix, INPUTS, self.topic)
+        return reduce(str.removesuffix, INPUT_TOPICS, self.topic)
 
 
 def commands_of_bag(recording: Recording, plant: PlantDescription, rig: Rig) -> BagCommands:
@@ -203,7 +203,7 @@ def write_answer(
         answer = _answer_as_stamped(driven, commands, stamps, _recorded_shaft(recording, commands))
         if noise_seed is not None:
             answer = _noisy(answer, SensorModel(plant.sensors, noise_seed))
-        streams = [_copied(recording, suffix) for suffix in INPUTS if recording.has(suffix)]
+        streams = [_copied(recording, suffix) for suffix in INPUT_TOPICS if recording.has(suffix)]
         streams += _encoded(answer, times, commands.joints)
         if recording.has(POSE_TOPIC):
             bending_ns = times[BENDING].stamp_ns

@@ -27,7 +27,7 @@ MOTOR = 'motor/measured_js'
 WIRES = 'wires/measured_js'
 BENDING = 'slave/measured_js'
 DESIRED = 'slave/servo_jp'
-INPUTS = (SETPOINT, COMMAND, DESIRED)
+INPUT_TOPICS = (SETPOINT, COMMAND, DESIRED)
 """The nearest to the shafts first.
 
 A setpoint shows what the motor driver made of commands: which it obeyed, how it bounded them, and
@@ -141,7 +141,7 @@ class RigRecording:
 
 def input_topic(bag: Recording, namespace: str | None = None) -> str:
     """The plant's input, the nearest to the shafts that was recorded; empty where none was."""
-    return next((topic for topic in INPUTS if bag.has(topic, namespace)), '')
+    return next((topic for topic in INPUT_TOPICS if bag.has(topic, namespace)), '')
 
 
 QUANTITY_TOPICS = {

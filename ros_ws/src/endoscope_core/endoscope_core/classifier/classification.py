@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from endoscope_core.errors import EndoscopeError
 
-WIRES = 4
+WIRE_COUNT = 4
 """Wires whose tensions a classifier reads, in the order x_pos, x_neg, y_pos, y_neg."""
 LEVEL = 0.9
 """Share of intervals that are to hold the true size."""

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from endoscope_core.classifier.classification import (
     HALF_CLASS,
     LEVEL,
-    WIRES,
+    WIRE_COUNT,
     ClassificationResult,
     UnseenTensionError,
     checked_tension,
@@ -108,8 +108,8 @@ def logarithm(tension: Single) -> Single:
 
 def cnn_shapes(classes: int) -> dict[str, tuple[int, ...]]:
     """Shape of each array of weights of the network for a number of classes."""
-    shapes: dict[str, tuple[int, ...]] = {'offset': (WIRES,), 'scale': (WIRES,)}
-    for k, (width, wider) in enumerate(zip((WIRES, *CHANNELS), CHANNELS, strict=False)):
+    shapes: dict[str, tuple[int, ...]] = {'offset': (WIRE_COUNT,), 'scale': (WIRE_COUNT,)}
+    for k, (width, wider) in enumerate(zip((WIRE_COUNT, *CHANNELS), CHANNELS, strict=False)):
         shapes |= {f'filter.{k}': (STRIDE * width, wider), f'bias.{k}': (wider,)}
     outputs, features = classes + OWN_OUTPUTS, CHANNELS[-1]
     shapes |= {'dense': (features, outputs), 'bias': (outputs,)}
@@ -157,7 +157,7 @@ class CnnClassifier:
         The wires are in the order x_pos, x_neg, y_pos, y_neg. UnseenTensionError where the tensions
         are unlike any of the training, or their size is none of the classes.
         """
-        array = checked_tension(tension, (self._samples, WIRES))
+        array = checked_tension(tension, (self._samples, WIRE_COUNT))
         judgement = self.judged(course(array, self.motion)[None])
         [reason] = self.reasons_to_refuse(judgement)
         if reason:

@@ -15,7 +15,7 @@ from msgspec import Meta
 from numpy.typing import DTypeLike
 from safetensors import SafetensorError
 
-from endoscope_core.classifier.classification import WIRES, ClassifierError
+from endoscope_core.classifier.classification import WIRE_COUNT, ClassifierError
 from endoscope_core.classifier.cnn_classifier import (
     CnnClassifier,
     HeldOutCalibration,
@@ -142,7 +142,7 @@ def load_classifier(weights: str | Path | None = None, motion: str = SINUSOID) -
     calibration = HeldOutCalibration(described.inflation, described.ceiling, described.doubt)
     classifier = CnnClassifier(own, calibration, described.classes_deg, motion)
     # Slack wires' constant tension shows whether the numbers go together at all.
-    slack = np.full((calibration_motion(motion).samples, WIRES), 1.0)
+    slack = np.full((calibration_motion(motion).samples, WIRE_COUNT), 1.0)
     judgement = classifier.judged(course(slack, motion)[None])
     if not all(np.all(np.isfinite(x)) for x in vars(judgement).values()):
         raise ClassifierError(f'{path} holds no classifier weights: its answers are not finite')

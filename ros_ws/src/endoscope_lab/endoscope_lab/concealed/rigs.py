@@ -15,7 +15,7 @@ from endoscope_explain.fit.free_parameters import SCALED_NOMINAL
 
 Array = NDArray[np.float64]
 
-MOST_BENT = math.radians(240.0)
+MOST_RECORDED = math.radians(240.0)
 """Largest bend of the recorded tubes."""
 OFF = 0.1
 """Half-width of the relative difference of a rig's parameters from its description."""
@@ -30,7 +30,7 @@ straight angle of its section in rad, and of the spread of its pre-sliding."""
 
 def described_rig(generator: np.random.Generator, joints: int) -> PlantDescription:
     """A tube of the recorded family, as its engineer describes it."""
-    joint = shipped_family().joint(generator.uniform(0.0, MOST_BENT))
+    joint = shipped_family().joint(generator.uniform(0.0, MOST_RECORDED))
     return PlantDescription(joints=dict.fromkeys(JOINTS[:joints], joint))
 
 

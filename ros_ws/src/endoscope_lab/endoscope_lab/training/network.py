@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from endoscope_core.classifier.classification import WIRES
+from endoscope_core.classifier.classification import WIRE_COUNT
 from endoscope_core.classifier.cnn_classifier import CHANNELS, STRIDE
 from endoscope_core.errors import EndoscopeError
 
@@ -29,8 +29,8 @@ class StandardisedTension(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        self.register_buffer('offset', torch.zeros(WIRES, 1))
-        self.register_buffer('scale', torch.ones(WIRES, 1))
+        self.register_buffer('offset', torch.zeros(WIRE_COUNT, 1))
+        self.register_buffer('scale', torch.ones(WIRE_COUNT, 1))
 
     def standardise_by(self, tension: Tensor) -> None:
         """Take mean and standard deviation of each wire over recordings (R, 4, N) as the unit."""
@@ -52,7 +52,7 @@ class TensionCnn(StandardisedTension):
     def __init__(self, outputs: int) -> None:
         super().__init__()
         layers: list[nn.Module] = []
-        for width, wider in pairwise((WIRES, *CHANNELS)):
+        for width, wider in pairwise((WIRE_COUNT, *CHANNELS)):
             layers += [nn.Conv1d(width, wider, STRIDE, STRIDE), nn.BatchNorm1d(wider), nn.ReLU()]
         self.features = nn.Sequential(*layers)
         self.dense = nn.Linear(CHANNELS[-1], outputs)
