@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from rclpy.time import Time
 from sensor_msgs.msg import JointState, Joy
-from simulated_graph import TICK_RATE, SimulatedGraph
+from simulated_graph import SimulatedGraph
 
 from endoscope_core.rig import load_rig
 from endoscope_nodes.names import (
@@ -18,6 +18,8 @@ from endoscope_nodes.names import (
 from endoscope_nodes.runtime.qos import COMMAND, EVENT, SENSOR_OFFERED
 
 RIG = load_rig()
+TICK_RATE = 250
+"""Hz: what a tick may change is held at a quarter of what the nodes beat at by themselves."""
 # What a goal of the shafts may change in a tick: the shaper's speed, and rounding.
 TICK_S = 1.0 / TICK_RATE
 BOUND = RIG.motors.speed * TICK_S * 1.001
@@ -148,7 +150,7 @@ class Moved:
 
 def run(**arguments):
     """The graph, enabled."""
-    graph = SimulatedGraph(**arguments)
+    graph = SimulatedGraph(tick_rate=TICK_RATE, **arguments)
     graph.enable()
     return graph
 

@@ -6,7 +6,8 @@ a slow machine is no reason, nor is physics that has to be compiled anew. Files 
 first. A file that takes half more than its budget fails the run, where `make -C ros_ws test` tries
 it once more with nothing beside it; `make -C ros_ws durations` writes the budgets anew. What a
 browser and its system calls take is in no such proportion (1.5 to 1.9 times as much on another
-machine of the same loop), so such tests may take three times as much (`TOO_MUCH`).
+machine of the same loop), so such tests may take three times as much (`TOO_MUCH`). At night there
+are no budgets.
 """
 
 import json
@@ -141,7 +142,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         costs = {f: c for f, c in {**_budgets(), **_costs()}.items() if (root / f).exists()}
         text = json.dumps(dict(sorted(costs.items())), indent=1)
         BUDGETS.write_text(f'{text}\n')
-    elif over := _over_budget():
+    elif over := _over_budget(session.config):
         session.config.cache.set('run_report/over_budget', [*over])
         session.exitstatus = session.exitstatus or OVER_BUDGET
 
@@ -151,7 +152,9 @@ def _costs() -> dict[str, float]:
     return {file: round(seconds / loop, 1) for file, seconds in _cpu.items()}
 
 
-def _over_budget() -> dict[str, tuple[float, float]]:
+def _over_budget(config: pytest.Config) -> dict[str, tuple[float, float]]:
+    if config.option.markexpr == 'nightly':
+        return {}
     budgets, costs = _budgets(), _costs()
     return {
         file: (cost, budgets[file])
@@ -172,7 +175,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
             write(f'{cost:7.1f} loops of CPU time  {file}')
         write(f'{costs.total():7.1f} in all, {statistics.median(_loops):.2f} s each')
     if 'WRITE_DURATIONS' not in os.environ and _loops:
-        for file, (cost, budget) in _over_budget().items():
+        for file, (cost, budget) in _over_budget(terminalreporter.config).items():
             write(f'over its budget: {file} took {cost:.1f} loops of CPU time, not {budget:.1f}')
     reasons = Counter(_reason(report) for report in terminalreporter.stats.get('skipped', []))
     if reasons:

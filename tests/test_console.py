@@ -180,6 +180,7 @@ def test_what_nobody_operates_any_more_is_paused_with_an_alarm(rig):
         assert watching.order('acknowledge', alarm='unattended')['ok']
 
 
+@pytest.mark.nightly
 def test_another_server_of_a_page_at_the_handle_is_another_sender(rig):
     with (
         joined_graph('console_web', 'endoscope', rig.domain) as another,
@@ -350,6 +351,7 @@ def test_strangers_and_other_pages_move_nothing_and_open_nothing(rig, operator, 
     assert operator.order('set', scale=1.0)['ok']
 
 
+@pytest.mark.nightly
 def test_sockets_that_say_nothing_are_let_in_eight_at_a_time_and_for_two_seconds(rig, operator):
     url = rig.server.address.replace('http', 'ws', 1)
     with ExitStack() as stack:
@@ -376,6 +378,7 @@ def test_a_killed_server_moves_nothing_on(rig):
         assert rig.stands()
 
 
+@pytest.mark.nightly
 def test_a_terminated_server_releases_and_gives_back(rig):
     with rig.page() as page:
         follows(rig, page)
@@ -385,6 +388,7 @@ def test_a_terminated_server_releases_and_gives_back(rig):
         assert page.wait(lambda: page.closed is not None)
 
 
+@pytest.mark.nightly
 def test_a_graph_that_is_begun_records_nothing_unasked(tmp_path):
     environment = os.environ | {'ROS_DOMAIN_ID': str(private_domain())}
     server = Server(tmp_path, environment, f'--graph=-p tick_rate:={OPERATED_RATE}')

@@ -15,7 +15,7 @@ from endoscope_lab.console.served_console import SAME_RAD, ServedConsole
 from endoscope_nodes.runtime.private_domain import private_domain
 
 SETTLED_S, WATCHED_S = 1.0, 0.5
-DAILY = ('another tab in front', 'page process stopped', 'network silent')
+DAILY = ('page process stopped', 'network silent')
 
 
 @pytest.fixture(scope='module')

@@ -209,6 +209,7 @@ def test_without_consent_nothing_moves_and_who_loses_the_controls_loses_what_is_
     rig.until(lambda: 'console_web' not in rig.handle_senders(), 'a free place of the handle')
 
 
+@pytest.mark.nightly
 def test_one_is_explained_its_plant_shown_by_a_motion_and_adopted_and_undone(running, page):
     rig = running
     rig.until(lambda: page.state.get('investigations'), 'what was there before')

@@ -1,6 +1,6 @@
 """The page of the console in a real browser: each button, each kind of hand, what ends a grip.
 
-Seven journeys for every change; the others are tried at night.
+Five journeys for every change; the others are tried at night.
 """
 
 import re
@@ -181,25 +181,33 @@ def test_a_gamepad_holds_and_lets_go_when_unplugged(console, browser):
         shows(page, 'state', 'PAUSED')
 
 
-def test_what_takes_the_page_away_lets_go_at_once_and_says_why(console, browser):
+@pytest.mark.parametrize(
+    ('script', 'reason'),
+    [
+        ("dispatchEvent(new Event('blur'))", 'this page is not in front'),
+        *(
+            pytest.param(*one, marks=pytest.mark.nightly)
+            for one in (
+                ("document.dispatchEvent(new Event('freeze'))", 'this page was frozen'),
+                ("document.getElementById('tab-see').click()", 'the section is out of sight'),
+            )
+        ),
+    ],
+)
+def test_what_takes_the_page_away_lets_go_at_once_and_says_why(console, browser, script, reason):
     # What the server said before it heard of that hides no reason.
     with console.page(browser, script=REPEATS) as page:
-        for script, reason in (
-            ("dispatchEvent(new Event('blur'))", 'this page is not in front'),
-            ("document.dispatchEvent(new Event('freeze'))", 'this page was frozen'),
-            ("document.getElementById('tab-see').click()", 'the section is out of sight'),
-        ):
-            enable(page)
-            begin = console.now_ns
-            press, release = press_keys(page, 'Space', 'ArrowLeft')
-            left = leaves(console, page, begin, f'{script}; saidAgain()')
-            grip(page, press, release, left)
-            shows(page, 'lamp', 'OPEN')
-            shows(page, 'lamp-why', reason)
-            page.evaluate("dispatchEvent(new Event('focus'))")
-            page.keyboard.down('Space')
-            assert console.stands(page), 'a key that is held all along does not engage again'
-            release()
+        enable(page)
+        begin = console.now_ns
+        press, release = press_keys(page, 'Space', 'ArrowLeft')
+        left = leaves(console, page, begin, f'{script}; saidAgain()')
+        grip(page, press, release, left)
+        shows(page, 'lamp', 'OPEN')
+        shows(page, 'lamp-why', reason)
+        page.evaluate("dispatchEvent(new Event('focus'))")
+        page.keyboard.down('Space')
+        assert console.stands(page), 'a key that is held all along does not engage again'
+        release()
 
 
 def test_of_two_pages_the_one_that_takes_over_has_the_controls(console, browser, page):
@@ -232,6 +240,7 @@ def test_of_two_pages_the_one_that_takes_over_has_the_controls(console, browser,
         shows(other, 'operator', 'nobody')
 
 
+@pytest.mark.nightly
 def test_pause_is_always_live_for_who_operates(console, page):
     enable(page)
     page.click('#pause')
@@ -285,6 +294,7 @@ def test_what_covers_the_view_or_the_keys_lets_go(console, page):
         release()
 
 
+@pytest.mark.nightly
 def test_home_calibration_and_compensation(console, page):
     enable(page)
     begin = console.now_ns

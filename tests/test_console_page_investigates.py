@@ -102,6 +102,7 @@ def test_an_investigation_asks_plays_under_the_hand_and_stops(running, page):
     expect(card(page).get_by_role('button', name='Continue')).to_be_enabled()
 
 
+@pytest.mark.nightly
 def test_a_plant_is_adopted_and_undone(page):
     page.click('#tab-explain')
     in_force = page.locator('#in-force p')

@@ -36,6 +36,8 @@ API = {
 }
 """Pages of what packages export, with modules that they have to name."""
 TUTORIAL = WORKSPACE / 'doc/tutorial.md'
+DAILY = ('README', 'explaining', 'plant_file')
+"""Pages that are run for every change; the others show more of the same graph."""
 
 each_page = pytest.mark.parametrize('page', PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 
@@ -95,12 +97,15 @@ def test_readme_names_every_command() -> None:
 @pytest.mark.parametrize(
     'page',
     [
-        page
+        pytest.param(
+            page,
+            id=str(page.relative_to(ROOT)),
+            marks=() if page.stem in DAILY else pytest.mark.nightly,
+        )
         for page in PAGES
         if page != TUTORIAL
         and any(b.language in ('console', 'python') and b.is_run for b in blocks(page))
     ],
-    ids=lambda page: str(page.relative_to(ROOT)),
 )
 @pytest.mark.timeout(600)
 def test_what_a_page_shows_runs(page: Path, tmp_path: Path) -> None:
@@ -140,13 +145,15 @@ def test_the_site_needs_no_network(site: Path) -> None:
 
 
 def test_pages_keep_what_the_code_says(tmp_path: Path) -> None:
-    doc = shutil.copytree(WORKSPACE / 'doc', tmp_path / 'doc')
-    script = [sys.executable, doc / 'reference_pages.py']
+    for room in ('doc', 'security'):
+        shutil.copytree(WORKSPACE / room, tmp_path / room)
+    script = [sys.executable, tmp_path / 'doc/reference_pages.py']
     subprocess.run(script, check=True, env=os.environ | {'COLUMNS': '30'})
     stale = [
-        str(page.relative_to(doc))
-        for page in sorted(doc.rglob('*.md'))
-        if page.read_text() != (WORKSPACE / 'doc' / page.relative_to(doc)).read_text()
+        str(page.relative_to(tmp_path))
+        for page in sorted(tmp_path.rglob('*'))
+        if page.suffix in ('.md', '.xml')
+        and page.read_text() != (WORKSPACE / page.relative_to(tmp_path)).read_text()
     ]
     assert stale == [], 'run `make -C ros_ws reference` and commit what it writes'
 

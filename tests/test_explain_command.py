@@ -121,6 +121,7 @@ def test_a_lacking_topic_is_named(rig, tmp_path, capsys, topic):
     assert topic in refused(capsys, rig, tmp_path / 'out', bag)
 
 
+@pytest.mark.nightly
 @pytest.mark.engine
 def test_a_rig_without_load_cells_is_explained_and_what_cannot_be_told_is_said(tmp_path, capsys):
     save_plant(PLANT, tmp_path / 'plant.yaml')

@@ -34,7 +34,10 @@ def assert_same_figures(numbers, values):
 
 @pytest.mark.parametrize(
     ('size_deg', 'seed', 'motion', 'longest_s'),
-    [(50, 901, 'sinusoid', 11.0), (80, 902, 'brief', 5.0)],
+    [
+        pytest.param(50, 901, 'sinusoid', 11.0, marks=pytest.mark.nightly),
+        (80, 902, 'brief', 5.0),
+    ],
 )
 def test_finds_the_class_of_a_known_tube_from_anywhere(tmp_path, size_deg, seed, motion, longest_s):
     overrides = tube_of_size(tmp_path, size_deg, seed) | {'calibration': {'motion': motion}}
@@ -86,6 +89,7 @@ def test_tensions_of_no_known_tube_are_refused_and_nothing_is_compensated(tmp_pa
         assert graph.states[-1] == 'ENABLED'
 
 
+@pytest.mark.nightly
 def test_wires_that_lost_pretension_are_told_with_the_class_by_the_plant(tmp_path):
     plant = PlantDescription()
     joints = {k: dataclasses.replace(j, pretension=3.54) for k, j in plant.joints.items()}

@@ -39,6 +39,7 @@ def track(graph, desired, measured):
     return tracking_rmse([wanted[m.stamp_ns] for m in inside], [m.position for m in inside])
 
 
+@pytest.mark.nightly
 def test_feed_forward_and_feedback_reduce_the_error_of_42_sin_t(tmp_path, motion_file):
     """In a tube half-way between two classes, on a rig that nothing was trained with.
 

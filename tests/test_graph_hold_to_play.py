@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from commanded_graph import BOUND, STILL, Moved, run
+from commanded_graph import BOUND, STILL, TICK_RATE, Moved, run
 from sensor_msgs.msg import Joy
-from simulated_graph import TICK_RATE
 
 from endoscope_core.signals.command_file import write_command_file
 from endoscope_nodes.names import MASTER_CLUTCH

@@ -1,8 +1,9 @@
 """A tracker that goes blind, dies, or reads single samples wrong."""
 
 import numpy as np
-from commanded_graph import BOUND
-from simulated_graph import TICK_RATE, SimulatedGraph
+import pytest
+from commanded_graph import BOUND, TICK_RATE
+from simulated_graph import SimulatedGraph
 from tubes import slave_of
 
 from endoscope_core.physics import EffectSpec, PlantDescription
@@ -15,7 +16,7 @@ def weight(graph):
 
 
 def test_a_blind_tracker_fades_the_feedback_out_and_back_in_without_a_jump():
-    with SimulatedGraph(overrides=CALIBRATION) as graph:
+    with SimulatedGraph(overrides=CALIBRATION, tick_rate=TICK_RATE) as graph:
         drives = graph.listen('motor/servo_jp', ('motor_x', 'motor_y'))
         corrections = graph.listen('controller/correction_js')
         graph.advance(2.0)
@@ -46,8 +47,9 @@ def test_a_blind_tracker_fades_the_feedback_out_and_back_in_without_a_jump():
         assert graph.states[-1] == 'ENABLED'
 
 
+@pytest.mark.nightly
 def test_a_dead_tracker_node_leaves_the_feed_forward_going_and_comes_back_without_a_jump():
-    with SimulatedGraph(overrides=CALIBRATION) as graph:
+    with SimulatedGraph(overrides=CALIBRATION, tick_rate=TICK_RATE) as graph:
         drives = graph.listen('motor/servo_jp', ('motor_x', 'motor_y'))
         graph.enable()
         graph.calibrate()

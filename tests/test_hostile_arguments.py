@@ -135,7 +135,9 @@ def sound(tmp_path_factory):
 
 
 @pytest.mark.engine
-@pytest.mark.parametrize('blocked', BLOCKED)
+@pytest.mark.parametrize(
+    'blocked', [BLOCKED[0], pytest.param(BLOCKED[1], marks=pytest.mark.nightly)]
+)
 @pytest.mark.parametrize('words', WRITING)
 def test_outputs_that_cannot_be_written_are_one_line(words, blocked, hostile, sound, capsys):
     with contextlib.chdir(sound):

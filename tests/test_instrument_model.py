@@ -25,7 +25,10 @@ def bag(tmp_path_factory):
     """Two seconds of a motion."""
     path = tmp_path_factory.mktemp('instrument') / 'bag'
     with SimulatedGraph(
-        extra=(*SHOWING_NODES, RecorderNode), overrides={'recorder': {'bag': str(path)}}, rig=RIG
+        extra=(*SHOWING_NODES, RecorderNode),
+        overrides={'recorder': {'bag': str(path)}},
+        rig=RIG,
+        tick_rate=250,
     ) as graph:
         graph.enable()
         graph.set('master', source='motion', motion='non_periodic')

@@ -96,6 +96,7 @@ def test_a_motion_is_played_in_a_session_of_its_own_and_leaves_everything_as_it_
     assert np.abs(played[:, 1]).max() < 0.05
 
 
+@pytest.mark.nightly
 def test_a_motion_is_played_through_a_plant_that_is_in_force_only_meanwhile(tmp_path):
     motion, csv = held_out(PlantDescription(), shipped_rig()), tmp_path / 'held_out.csv'
     write_command_file(csv, motion.table.time, motion.table.angle)
@@ -182,6 +183,7 @@ def test_without_a_person_to_ask_it_does_not_begin(tmp_path, capsys):
     assert not (tmp_path / 'out').exists()
 
 
+@pytest.mark.nightly
 def test_a_rig_as_described_is_explained_by_one_motion(tmp_path, capfd, monkeypatch):
     monkeypatch.setitem(live_graph.RATE, True, TICK_RATE)
     plant, out = tmp_path / 'plant.yaml', tmp_path / 'out'

@@ -125,6 +125,7 @@ def stands_still(graph):
     return before < STILL and now < STILL
 
 
+@pytest.mark.nightly
 def test_a_stranger_who_commands_is_a_fault(graph, motion, tmp_path, strangers):
     def happens():
         sender = Sender(graph, SLAVE_COMMAND)
@@ -140,6 +141,7 @@ def test_a_stranger_who_commands_is_a_fault(graph, motion, tmp_path, strangers):
     assert stands_still(graph)
 
 
+@pytest.mark.nightly
 def test_a_session_that_is_taken_ends_the_motion(graph, motion, tmp_path):
     def happens():
         graph.command('pause')

@@ -10,9 +10,9 @@ from types import SimpleNamespace
 import commanded_graph
 import numpy as np
 import pytest
-from commanded_graph import BOUND, RIG, STILL, TICK_S, Handle, Moved, run, ticks
+from commanded_graph import BOUND, RIG, STILL, TICK_RATE, TICK_S, Handle, Moved, run, ticks
 from sensor_msgs.msg import JointState, Joy
-from simulated_graph import TICK_RATE, SimulatedGraph
+from simulated_graph import SimulatedGraph
 
 from endoscope_nodes.names import CORRECTION, MOTOR_MEASURED, MOTORS, SLAVE_COMMAND
 from endoscope_nodes.runtime.diagnostics import OK, WARN

@@ -240,6 +240,7 @@ def test_arrays_command_joints_or_shafts(tmp_path):
     )
 
 
+@pytest.mark.nightly
 @pytest.mark.engine
 def test_desired_angles_are_times_the_gear_of_the_rig_that_was_recorded(tmp_path):
     rig = replace(shipped_rig(), joints=replace(shipped_rig().joints, gear=0.6, drive=2.5))

@@ -60,7 +60,9 @@ def test_enable_is_refused_while_a_cause_is_present(graph):
     assert operate(graph, 'enable')[0] == 0
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGHUP])
+@pytest.mark.parametrize(
+    'number', [signal.SIGINT, pytest.param(signal.SIGHUP, marks=pytest.mark.nightly)]
+)
 def test_whoever_interrupts_a_calibration_pauses_the_graph(graph, number):
     assert operate(graph, 'enable')[0] == 0
     process = graph.start('operate', 'calibrate', '--timeout', '60')

@@ -28,7 +28,7 @@ def recorded(tmp_path_factory):
     """Motions that end before their end, a pause in one, rests, and the slave disabled once."""
     bag = tmp_path_factory.mktemp('own') / 'bag'
     overrides = {'motor_driver': {'seed': 3}}
-    with LiveGraph(bag, private_domain(), lock_step=True, overrides=overrides) as graph:
+    with LiveGraph(bag, private_domain(), lock_step=True, overrides=overrides, rate=250) as graph:
         graph.client.ask('enable')
         graph.set('master', source='motion', motion='periodic')
         graph.advance(4.3)
@@ -51,7 +51,9 @@ def recorded(tmp_path_factory):
     return bag
 
 
-@pytest.fixture(scope='module', params=[(0.0, None), (2.1, None)])
+@pytest.fixture(
+    scope='module', params=[(0.0, None), pytest.param((2.1, None), marks=pytest.mark.nightly)]
+)
 def stretch(request, recorded, tmp_path_factory):
     out = tmp_path_factory.mktemp('cut') / 'cut'
     cut(recorded, out, *request.param)

@@ -56,7 +56,8 @@ def _declared(package: Path, *more: str) -> set[str]:
 def _locked_modules() -> set[str]:
     settings = tomllib.loads((WORKSPACE / 'pyproject.toml').read_text())
     groups = settings['dependency-groups']
-    optional = [line for group in ('viewers', 'train', 'pandas') for line in groups[group]]
+    wanted = ('viewers', 'train', 'pandas', 'lerobot')
+    optional = [line for group in wanted for line in groups[group]]
     lines = settings['project']['dependencies'] + optional
     names = [re.split(r'[^\w-]', line, maxsplit=1)[0] for line in lines]
     return {IMPORT_NAMES.get(name, name) for name in names}

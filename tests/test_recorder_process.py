@@ -89,6 +89,7 @@ class RecorderProcess:
         self.context.shutdown()
 
 
+@pytest.mark.nightly
 def test_a_signal_finishes_the_recording(tmp_path):
     with RecorderProcess(tmp_path / 'bag') as recorder:
         recorder.send(500)
@@ -195,6 +196,7 @@ def test_topics_on_which_nothing_comes_are_reported_at_once_and_at_the_end(tmp_p
     assert 'no message came on /endoscope/wires/measured_js, foo' in output
 
 
+@pytest.mark.nightly
 def test_a_replay_says_how_far_it_came(tmp_path):
     with BagWriter(tmp_path / 'bag') as writer:
         for k in range(2000):

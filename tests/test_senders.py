@@ -9,12 +9,12 @@ import time
 import commanded_graph
 import numpy as np
 import pytest
-from commanded_graph import BOUND, STILL, TICK_S, Handle, Moved, Sender, run, ticks
+from commanded_graph import BOUND, STILL, TICK_RATE, TICK_S, Handle, Moved, Sender, run, ticks
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from rclpy.time import Time
 from sensor_msgs.msg import JointState, Joy
-from simulated_graph import PATIENCE_S, TICK_RATE
+from simulated_graph import PATIENCE_S
 from std_msgs.msg import Header, String
 
 from endoscope_core.safety import Refusal

@@ -103,6 +103,7 @@ def test_a_held_key_moves_the_slave_and_its_release_stops_it(graph):
     assert graph.state == 'ENABLED'
 
 
+@pytest.mark.nightly
 def test_a_signal_releases_the_clutch_and_restores_everything(graph):
     with Typist(graph, '--take', '--scale', '0.5') as typist:
         typist.enable()
@@ -115,6 +116,7 @@ def test_a_signal_releases_the_clutch_and_restores_everything(graph):
         assert typist.stands()
 
 
+@pytest.mark.nightly
 def test_a_terminal_that_is_closed_releases_the_clutch(graph):
     with Typist(graph, '--take') as typist:
         typist.enable()
@@ -136,6 +138,7 @@ def test_a_program_that_is_killed_moves_nothing_any_more(graph):
         assert typist.stands()
 
 
+@pytest.mark.nightly
 def test_home_goes_on_while_its_key_is_held_and_is_paused_otherwise(graph):
     with Typist(graph, '--take', '--speed', '57') as typist:
         typist.enable()

@@ -10,6 +10,8 @@ from doc_pages import WORKSPACE, run_page
 from endoscope_bags import open_bag
 from endoscope_core.physics import load_plant
 
+pytestmark = pytest.mark.nightly
+
 TUTORIAL = WORKSPACE / 'doc/tutorial.md'
 
 

@@ -60,6 +60,7 @@ AXES = (
 """Largest value, whether its logarithm is shown, and what stands at the axis."""
 
 
+@pytest.mark.nightly
 def test_places_on_an_axis_are_told_apart(browser: Browser) -> None:
     for size, log, ticks in AXES:
         values = np.geomspace(0.5, size, 200) if log else np.linspace(-size, size, 200)
@@ -185,6 +186,7 @@ LOOKS: tuple[tuple[Literal['dark', 'light'], Literal['screen', 'print'], str], .
 )
 
 
+@pytest.mark.nightly
 def test_the_look_follows_the_reader_and_paper_is_light(page: Page) -> None:
     """What is drawn, too: its colour is that of the scheme."""
     for scheme, media, ground in LOOKS:
@@ -209,6 +211,7 @@ def test_it_works_in_a_sandboxed_frame_that_allows_scripts_alone(browser: Browse
     assert complaints == []
 
 
+@pytest.mark.nightly
 def test_without_javascript_it_says_so_and_has_the_numbers(browser: Browser) -> None:
     with drawn(page_of_plots(), within=browser, java_script_enabled=False) as (page, complaints):
         expect(page.get_by_text('Without JavaScript')).to_be_visible()

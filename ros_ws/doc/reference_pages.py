@@ -31,12 +31,14 @@ from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.plant_file import plant_to_mapping
 from endoscope_explain.report.writing import KEYS
 from endoscope_nodes import program
+from endoscope_nodes.names import CLOCK_NODE
 from endoscope_nodes.runtime.node_parameters import OF_NODE, OF_PROCESS
 from endoscope_nodes.runtime.parameters import Described, as_typed, described
 from endoscope_nodes.services import SERVICES, TRIGGER
 from endoscope_nodes.topics import RECORDED, TOPICS, GraphTopic, Qos
 
-PAGES = sorted(Path(__file__).parent.rglob('*.md'))
+_HERE = Path(__file__).parent
+PAGES = (*sorted(_HERE.rglob('*.md')), _HERE.with_name('security') / 'policy.xml')
 WIDTH = 100
 """Columns of a command's usage, whatever the terminal has."""
 
@@ -44,6 +46,11 @@ CORE = (
     *('physics', 'signals', 'hysteresis', 'control', 'calibration', 'identification'),
     *('metrics', 'kinematics', 'safety'),
 )
+OF_EVERY_NODE = (
+    *('describe_parameters', 'get_parameter_types', 'get_parameters', 'list_parameters'),
+    *('set_parameters', 'set_parameters_atomically', 'get_type_description'),
+)
+"""Services that ROS gives every node."""
 DEVICES = ('dynamixel', 'load_cells', 'em_tracker')
 _INDENTED = re.compile(r'^(?: {4}.*\n)+', re.M)
 _PART = re.compile(
@@ -170,6 +177,31 @@ def _speakers(topic: GraphTopic) -> tuple[str, ...]:
 
 def _qos(qos: Qos | None) -> str:
     return '' if qos is None else str(qos)
+
+
+def _policy() -> Iterator[str]:
+    """What each node of the graph may do (SROS2): what the table of topics says that it does."""
+    for node in program.graph.nodes:
+        if node == CLOCK_NODE:
+            continue
+        who = {node, 'every node'}
+        said = [topic.name for topic in TOPICS if who & set(topic.said_by)]
+        heard = [topic.name for topic in TOPICS if who & set(topic.heard_by)]
+        if node == 'recorder':
+            heard += RECORDED
+        own = [service.name for service in SERVICES if service.served_by == node]
+        yield f'    <enclave path="/endoscope/{node}">'
+        yield '      <profiles>'
+        yield f'        <profile ns="/endoscope" node="{node}">'
+        for verb, kind, names in (
+            ('publish', 'topic', sorted({*said, '/parameter_events', '/rosout'})),
+            ('subscribe', 'topic', sorted({*heard, '/parameter_events'})),
+            ('reply', 'service', [*(f'{node}/{name}' for name in OF_EVERY_NODE), *own]),
+        ):
+            yield f'          <{kind}s {verb}="ALLOW">'
+            yield from (f'            <{kind}>{name}</{kind}>' for name in names)
+            yield f'          </{kind}s>'
+        yield from ('        </profile>', '      </profiles>', '    </enclave>')
 
 
 def _parameters() -> Iterator[str]:
@@ -333,6 +365,7 @@ PARTS: dict[str, Callable[[], Iterator[str]]] = {
     'nodes': _nodes,
     'topics': _topics,
     'parameters': _parameters,
+    'policy': _policy,
     'nominal-plant': _nominal_plant,
     'plant-keys': _plant_keys,
     'effects': _effects,

@@ -16,7 +16,7 @@ PAGE = """# Nightly run
 
 `make -C ros_ws nightly` runs what takes too long, or needs too much, for every change: faults in
 real time, another DDS, Docker files, clients and readers that others wrote, ROS 2 Kilted, PyTorch,
-the notebook, and one seed of each bench. Its last result, of {day}:
+LeRobot, the notebook, and one seed of each bench. Its last result, of {day}:
 
 | what | result | min |
 |---|---|---|

@@ -22,6 +22,7 @@ from endoscope_bags.errors import UnknownTypeError
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 POSE_STAMPED = 'geometry_msgs/msg/PoseStamped'
+WRENCH_STAMPED = 'geometry_msgs/msg/WrenchStamped'
 JOY = 'sensor_msgs/msg/Joy'
 STRING = 'std_msgs/msg/String'
 DIAGNOSTIC_ARRAY = 'diagnostic_msgs/msg/DiagnosticArray'

@@ -82,7 +82,16 @@ def test_a_table_holds_no_plants(bag, tmp_path, capsys):
     assert '--table' in capsys.readouterr().err
 
 
-@pytest.mark.parametrize('driver', ['motor/measured_js', 'motor/servo_jp', 'slave/servo_jp'])
+@pytest.mark.parametrize(
+    'driver',
+    [
+        'motor/servo_jp',
+        *(
+            pytest.param(driver, marks=pytest.mark.nightly)
+            for driver in ('motor/measured_js', 'slave/servo_jp')
+        ),
+    ],
+)
 def test_identifying_a_bag_finds_the_width_of_its_loop(calibration, tmp_path, driver, capsys):
     angle, made = calibration
     names = ['bend_x'] if driver.startswith('slave') else ['motor_x']

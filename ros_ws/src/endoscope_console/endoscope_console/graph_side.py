@@ -13,7 +13,6 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.task import Future
-from rclpy.time import Time
 
 from endoscope_console.explanations import NOMINAL
 from endoscope_console.pictures import Pictures
@@ -27,7 +26,7 @@ from endoscope_nodes.client.graph_parameters import read_parameter, set_paramete
 from endoscope_nodes.client.handle_sender import handle_senders
 from endoscope_nodes.client.plant_adoption import AdoptedPlants
 from endoscope_nodes.names import CONSOLE_LOG, FINISHED, MASTER_NODE
-from endoscope_nodes.runtime.diagnostics import OK, WARN, status
+from endoscope_nodes.runtime.diagnostics import OK, WARN, diagnostic_array, status
 from endoscope_nodes.runtime.environment import joined_node
 from endoscope_nodes.runtime.qos import EVENT
 
@@ -158,24 +157,17 @@ class GraphSide:
     def log(self, order: str, operator: str, address: str, ok: bool, why: str) -> None:
         """Publish an order and its outcome in the graph."""
         node = self.client.node
-        message = DiagnosticArray()
-        message.header.stamp = Time(nanoseconds=time.time_ns()).to_msg()
         became = (why or 'done') if ok else f'refused: {why}'
-        message.status = [
-            status(
-                f'{node.get_fully_qualified_name()}: order',
-                OK if ok else WARN,
-                f'{order}: {became}',
-                {
-                    'operator': operator,
-                    'address': address,
-                    'order': order,
-                    'answer': 'done' if ok else 'refused',
-                    'why': why,
-                },
-            )
-        ]
-        self._log.publish(message)
+        values = {
+            'operator': operator,
+            'address': address,
+            'order': order,
+            'answer': 'done' if ok else 'refused',
+            'why': why,
+        }
+        name, level = f'{node.get_fully_qualified_name()}: order', OK if ok else WARN
+        entry = status(name, level, f'{order}: {became}', values)
+        self._log.publish(diagnostic_array(time.time_ns(), entry))
 
     def close(self) -> None:
         """Hear and ask no more."""

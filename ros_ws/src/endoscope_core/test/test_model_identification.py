@@ -27,7 +27,9 @@ def test_a_model_is_found_again():
     assert 'dahl' in str(fit)
 
 
-@pytest.mark.parametrize('gain', [SMALLEST_ALPHA, GREATEST_ALPHA])
+@pytest.mark.parametrize(
+    'gain', [SMALLEST_ALPHA, pytest.param(GREATEST_ALPHA, marks=pytest.mark.nightly)]
+)
 @pytest.mark.parametrize('model', MODELS)
 def test_every_candidate_for_the_inverse_is_safe_whatever_the_gain_of_the_rig(model, gain):
     fit = fit_model([HysteresisRecording(DRIVER, gain * forward(TRUTH, DRIVER))], 0, model)
@@ -37,7 +39,9 @@ def test_every_candidate_for_the_inverse_is_safe_whatever_the_gain_of_the_rig(mo
         assert parameters.inverse_slope <= GREATEST_INVERSE_SLOPE * (1.0 + 1e-9)
 
 
-@pytest.mark.parametrize('model', MODELS)
+@pytest.mark.parametrize(
+    'model', [pytest.param(m, marks=pytest.mark.nightly if m == 'bouc_wen' else ()) for m in MODELS]
+)
 def test_whatever_is_recorded_what_comes_out_is_safe(model):
     generator = np.random.default_rng(0)
     driver = DRIVER[::4]

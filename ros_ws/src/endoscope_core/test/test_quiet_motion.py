@@ -27,10 +27,11 @@ from endoscope_core.rig import shipped_rig
 TICK = 1e-3
 LIMITS = MotorLimits.of(shipped_rig())
 FEEDBACK = {'alone': None, 'adaptive': AdaptiveBacklashController}
-# Every mode alone, and at the slowest rate what amplifies most; test_handle.py has the other rates.
-CASES = [(mode, 'alone', 1000) for mode in MODES]
-CASES += [(mode, 'adaptive', 50) for mode in ('none', 'bouc_wen', 'physical')]
+# At the slowest rate what amplifies most, at night every mode alone; test_handle.py has the other
+# rates.
+CASES = [(mode, 'adaptive', 50) for mode in ('none', 'bouc_wen', 'physical')]
 CASES += [(ADAPTIVE_PHYSICAL, 'alone', 50)]
+CASES += [pytest.param(mode, 'alone', 1000, marks=pytest.mark.nightly) for mode in MODES]
 
 
 def moved_to_and_rested_at(time):
@@ -101,7 +102,11 @@ def test_noise_of_one_count_at_rest_does_not_move_the_tip(mode, feedback, rate):
 
 @pytest.mark.parametrize(
     ('mode', 'feedback', 'rate'),
-    [('bouc_wen', 'adaptive', 50), ('physical', 'alone', 250), (ADAPTIVE_PHYSICAL, 'alone', 1000)],
+    [
+        ('bouc_wen', 'adaptive', 50),
+        pytest.param('physical', 'alone', 250, marks=pytest.mark.nightly),
+        pytest.param(ADAPTIVE_PHYSICAL, 'alone', 1000, marks=pytest.mark.nightly),
+    ],
 )
 def test_a_slow_motion_is_followed_with_noise_about_as_well_as_without(mode, feedback, rate):
     errors = []

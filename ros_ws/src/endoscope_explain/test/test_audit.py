@@ -35,7 +35,9 @@ def test_a_sound_recording_has_no_findings_and_stays_as_it_is(sound):
         assert kept.valid.all()
 
 
-@pytest.mark.parametrize('quantity', ['bending', 'tension'])
+@pytest.mark.parametrize(
+    'quantity', ['bending', pytest.param('tension', marks=pytest.mark.nightly)]
+)
 def test_a_gap_is_named_with_its_topic_and_its_beginning(sound, quantity):
     series = sound.measured()[quantity]
     keep = (series.time < 4.2) | (series.time >= 4.9)
@@ -140,7 +142,10 @@ def test_swapped_neighbours_are_put_in_order(sound):
     assert np.array_equal(report.recording.tension.values, sound.tension.values)
 
 
-@pytest.mark.parametrize(('quantity', 'jitter'), [('bending', 0.02), ('tension', 0.005)])
+@pytest.mark.parametrize(
+    ('quantity', 'jitter'),
+    [('bending', 0.02), pytest.param('tension', 0.005, marks=pytest.mark.nightly)],
+)
 def test_stamps_that_jitter_are_noted_with_how_much(sound, quantity, jitter):
     series = sound.measured()[quantity]
     off = np.random.default_rng(1).normal(0.0, jitter, len(series.time))
@@ -150,6 +155,7 @@ def test_stamps_that_jitter_are_noted_with_how_much(sound, quantity, jitter):
     assert noted.evidence['jitter_s'] == pytest.approx(jitter, rel=0.1)
 
 
+@pytest.mark.nightly
 def test_a_clock_that_is_set_back_is_a_fault(sound):
     time = sound.bending.time.copy()
     time[300:] -= 1.0
@@ -204,7 +210,9 @@ def test_clipping_is_named_with_wire_and_limit(sound):
     assert report.recording.tension.valid[values == 9.0].mean() < 0.01
 
 
-@pytest.mark.parametrize(('size', 'share'), [(0.2, 0.02), (0.05, 0.01)])
+@pytest.mark.parametrize(
+    ('size', 'share'), [pytest.param(0.2, 0.02, marks=pytest.mark.nightly), (0.05, 0.01)]
+)
 def test_isolated_wrong_tracker_samples_are_found(sound, size, share):
     rng = np.random.default_rng(3)
     values = sound.bending.values.copy()
@@ -226,7 +234,7 @@ def test_spikes_of_pure_noise_are_as_rare_as_said():
     assert spike_chance(np.array([height]), 1.0)[0] == pytest.approx(seen, rel=0.05)
 
 
-@pytest.mark.parametrize('skew', [2e-3, -5e-4])
+@pytest.mark.parametrize('skew', [pytest.param(2e-3, marks=pytest.mark.nightly), -5e-4])
 def test_a_skewed_clock_shows_in_the_times_of_receipt(sound, skew):
     rng = np.random.default_rng(5)
     every = {'command': sound.command, **sound.measured()}

@@ -138,8 +138,17 @@ def certain(stribeck_case):
     return dataclasses.replace(stribeck_case, effects=(alone,))
 
 
-def test_no_more_motions_are_asked_for_than_are_wanted(both, stribeck_case):
-    log = investigate(both, no_rig, lambda bags, known: stribeck_case)
+def test_no_more_motions_are_asked_for_than_are_wanted_and_what_was_named_is_known_to_the_next(
+    both, stribeck_case
+):
+    known_then = []
+
+    def explain(bags, known):
+        known_then.append(known)
+        return stribeck_case
+
+    log = investigate(both, no_rig, explain)
+    assert known_then == [{}, {'bend_x': {'stribeck_friction', 'viscous_friction'}}]
     assert log.stopped is Stop.USED_UP
     assert log.rounds[0].motion == 'commissioning'
     assert len(log.rounds) == 2
@@ -147,7 +156,11 @@ def test_no_more_motions_are_asked_for_than_are_wanted(both, stribeck_case):
     times = (both.folder / LOG_MD).read_text().split('## Times')[1]
     assert times.count('explaining') == 2
     assert log.rounds[0].proposed_s > 0.0
-    # More of them continue it.
+
+
+@pytest.mark.nightly
+def test_more_motions_continue_it_and_none_is_asked_for_again(both, stribeck_case):
+    investigate(both, no_rig, lambda bags, known: stribeck_case)
     again = investigate(
         dataclasses.replace(both, experiments=2), no_rig, lambda bags, known: stribeck_case
     )
@@ -185,7 +198,12 @@ def test_a_fault_ends_it_with_what_is_known_and_it_is_continued(both, stribeck_c
     ('error', 'stopped', 'words'),
     [
         (KeyboardInterrupt(), 'interrupted', 'It was interrupted: asked for by Ctrl-C'),
-        (EndoscopeError('timed out'), 'failed', 'It could not go on: timed out.'),
+        pytest.param(
+            EndoscopeError('timed out'),
+            'failed',
+            'It could not go on: timed out.',
+            marks=pytest.mark.nightly,
+        ),
     ],
 )
 def test_what_breaks_off_loses_nothing_and_is_called_what_it_was(
@@ -216,23 +234,13 @@ def test_what_breaks_off_loses_nothing_and_is_called_what_it_was(
     assert f'endoscope {version("endoscope_explain")}' in html
 
 
-def test_names_that_were_given_or_left_open_are_known_to_the_next_explanation(both, stribeck_case):
-    known_then = []
-
-    def explain(bags, known):
-        known_then.append(known)
-        return stribeck_case
-
-    investigate(both, no_rig, explain)
-    assert known_then == [{}, {'bend_x': {'stribeck_friction', 'viscous_friction'}}]
-
-
-def test_numbers_that_an_effect_may_stand_for_are_asked_about(both, certain, monkeypatch):
+def test_numbers_that_an_effect_may_stand_for_are_left_open(both, certain, monkeypatch):
     monkeypatch.setattr(prediction_set, 'MASS', 1.0)
     tried = Contest((('other numbers',), ('gravity', 'load_of_angle')), (9.0, 9.0), 5.0, False)
     found = {'effects': (), 'verdict': Verdict.PARAMETERS_DIFFER}
     explanation = dataclasses.replace(certain.explanation, contests={'bend_x': tried}, **found)
     left_open = dataclasses.replace(certain, explanation=explanation, **found)
+    both = dataclasses.replace(both, experiments=0)
     log = investigate(both, no_rig, lambda bags, known: left_open)
     (name,) = log.last_answer.names
     assert (name.id, name.joint, name.rivals) == ('other numbers', 'bend_x', tried.names[1])

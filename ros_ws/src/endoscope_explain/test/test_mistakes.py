@@ -69,12 +69,18 @@ def as_described(recording, plant, **_):
     ('change', 'sentence', 'lost'),
     [
         (in_degrees, 'slave/measured_js:bend_x is 57.3 times', set()),
-        (standing('bending'), 'slave/measured_js is frozen', {'slave/measured_js:bend_x'}),
+        pytest.param(
+            standing('bending'),
+            'slave/measured_js is frozen',
+            {'slave/measured_js:bend_x'},
+            marks=pytest.mark.nightly,
+        ),
         (standing('tension', since=3000), 'wires/measured_js is frozen', set()),
-        (
+        pytest.param(
             standing('shaft_position', 'shaft_velocity', 'shaft_effort'),
             'motor/measured_js is frozen',
             {'motor/measured_js:motor_x.position', 'motor/measured_js:motor_x.effort'},
+            marks=pytest.mark.nightly,
         ),
     ],
 )

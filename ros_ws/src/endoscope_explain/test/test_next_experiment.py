@@ -163,6 +163,7 @@ def test_the_proposal_names_its_laws_and_lasts_seconds(late_case, asking):
     assert f'{proposed.waveform.capitalize()} of bend_x' in proposed.why
 
 
+@pytest.mark.nightly
 def test_no_motion_decides_more_per_second_than_the_proposed_one(late_case, asking):
     proposed = propose(late_case, [asking])
 

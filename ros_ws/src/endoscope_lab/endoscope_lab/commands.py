@@ -194,6 +194,22 @@ BENCHES: dict[str, Bench] = {
             _flag('--cost', 'measure CPU time and rate of the graph'),
         ),
     ),
+    'touch': Bench(
+        'touch.trial',
+        'force at the tip: rigs that touch an obstacle in teleoperation',
+        'Force at the tip. Draws rigs of two simulators, identifies each from a motion in free '
+        'space, and teleoperates it against an obstacle of 0.02 to 2 N/mm; prints the error of '
+        'the force beyond the bound that friction sets, over the largest force, how often the '
+        'stated bounds hold the true force, and how many contacts of twice the visible force are '
+        'reported within 0.3 s. Then teleoperates rigs in free space, 10 min each, and prints the '
+        'false alarms. Seeds 1 to 999 are for development.',
+        (
+            _seeds('seeds of rigs that touch something (1-3)'),
+            _seeds('seeds of rigs in free space (1-2)', '--free', last=2),
+            _file('--json', 'file for all rows; cases in it are skipped'),
+            _jobs(),
+        ),
+    ),
     'validity': Bench(
         'validity',
         'how long a calibration stays valid',

@@ -57,6 +57,7 @@ def test_the_recorded_loop_has_the_size_of_its_class(small):
         assert np.rad2deg(np.mean(widths)) == pytest.approx(small.class_deg[row], abs=2.5)
 
 
+@pytest.mark.nightly
 def test_a_brief_calibration_is_of_the_same_tubes(small):
     brief = make_dataset(seed=3, per_class=1, motion='brief')
     assert brief.tension.shape == (7, 3140, 4)

@@ -17,7 +17,10 @@ def shipped(request):
     return load_classifier(motion=request.param)
 
 
-@pytest.mark.parametrize('size_deg', [42.0, 57.0, 73.5, 88.0, 101.0])
+@pytest.mark.parametrize(
+    'size_deg',
+    [42.0, 101.0, *(pytest.param(s, marks=pytest.mark.nightly) for s in (57.0, 73.5, 88.0))],
+)
 def test_it_regresses_the_size_of_a_tube_it_has_not_seen(shipped, size_deg):
     tube = never_seen_tube(0, int(10 * size_deg), size_deg)
     tension = record_calibration(tube.plant, 5, calibration_motion(shipped.motion)).tension

@@ -17,7 +17,7 @@ RIG = shipped_rig()
 @pytest.mark.parametrize(
     'stratum',
     [
-        pytest.param(s, marks=pytest.mark.nightly if s == 'other_simulator' else ())
+        pytest.param(s, marks=() if s == 'catalogue' else pytest.mark.nightly)
         for s in KINDS.values()
     ],
 )

@@ -15,17 +15,13 @@ from endoscope_lab.mistakes import drawing
 from endoscope_lab.mistakes.mistake import MISTAKES, is_reported
 
 SHOWN = (
-    'tracker',
-    'motors',
+    'wires of two joints',
     'tensions negative',
     'all stamps in us',
-    'command in mm of wire',
-    'wires of two joints',
-    'shaft in deg',
     'tension in kg',
 )
 """One mistake of each kind, tried on every change of the code: a place, a sign, a clock, a unit."""
-MOST_SIMILAR = ('tracker_bias', 'load_cell_gain', 'load_cell_delay', 'rate_limit', 'cross_coupling')
+MOST_SIMILAR = ('load_cell_gain', 'load_cell_delay')
 """Physics that is most similar to a mistake."""
 STRONGEST = [i for i, effect in CATALOGUE.items() if not effect.traits.audited]
 

@@ -14,6 +14,7 @@ from endoscope_lab.papers.tracking_trial import (
 )
 
 
+@pytest.mark.nightly
 def test_from_tensions_alone_the_inverse_leaves_a_twentieth_and_bouc_wen_a_third():
     tube = never_seen_tube(9, 0)
     findings = calibrate(tube, load_classifier())

@@ -27,7 +27,10 @@ def tip_missed(fit, bending):
     return np.sqrt(np.mean((made - bending) ** 2))
 
 
-@pytest.mark.parametrize(('seed', 'bend', 'unevenness'), [(1, 0.5, 0.0), (2, 2.0, 0.3)])
+@pytest.mark.parametrize(
+    ('seed', 'bend', 'unevenness'),
+    [pytest.param(1, 0.5, 0.0, marks=pytest.mark.nightly), (2, 2.0, 0.3)],
+)
 def test_three_seconds_of_two_tensions_show_plant_and_tip(seed, bend, unevenness):
     plant = in_tube(random_instrument(np.random.default_rng(seed)), bend, unevenness)
     truth, tension, bending = recorded(plant, seed)
@@ -40,7 +43,7 @@ def test_three_seconds_of_two_tensions_show_plant_and_tip(seed, bend, unevenness
     assert fit_plant(COMMAND, tension, gear=GEAR) == fit
 
 
-@pytest.mark.parametrize('share', [0.5, 1.6])
+@pytest.mark.parametrize('share', [0.5, pytest.param(1.6, marks=pytest.mark.nightly)])
 def test_wires_that_have_crept_or_were_tightened_hide_nothing(share):
     plant = in_tube(random_instrument(np.random.default_rng(5)), 1.0, 0.1)
     name, joint = next(iter(plant.joints.items()))

@@ -112,6 +112,7 @@ def outcome(laws, reported, after=1.0):
     return Outcome(rig, answer, {}, judged(laws, answer.reported))
 
 
+@pytest.mark.nightly
 def test_a_proof_from_end_to_end(tmp_path, capsys):
     out = tmp_path / 'proof'
     command = f'prove --n 1 --seed 4 --effect load_cell_gain --out {out}'

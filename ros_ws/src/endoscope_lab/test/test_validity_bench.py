@@ -21,6 +21,7 @@ def test_slow_changes_of_a_rig_give_a_plant():
     assert [effect.id for effect in now.effects] == ['external_load'] * len(now.joints)
 
 
+@pytest.mark.nightly
 def test_a_tube_that_is_bent_again_is_detected_and_one_that_stays_is_not():
     tube = never_seen_tube(1, 0)
     first = calibrate(tube, load_classifier())

@@ -34,16 +34,16 @@ def test_what_rcl_gives_to_a_node_here_is_not_worth_a_word(check, section):
 
 def test_sections_may_be_nested(check):
     assert check('endoscope:\n  recorder:\n    ros__parameters: {autostart: false}\n') == []
-    with pytest.raises(ParameterError, match=r"'/endoscope/recoder'.* did you mean 'recorder'"):
+    with pytest.raises(ParameterError, match=r"'/endoscope/recoder'.* did you mean recorder"):
         check('endoscope:\n  recoder:\n    ros__parameters: {autostart: false}\n')
 
 
 @pytest.mark.parametrize(
     ('section', 'said'),
     [
-        ('/**/recoder', "did you mean 'recorder'"),
-        ('/endoscope/recoder', "did you mean 'recorder'"),
-        ('/arm1/recoder', "did you mean 'recorder'"),
+        ('/**/recoder', 'did you mean recorder'),
+        ('/endoscope/recoder', 'did you mean recorder'),
+        ('/arm1/recoder', 'did you mean recorder'),
         ('recorder', r"write '/endoscope/recorder' or '/\*\*/recorder'"),
         ('/master', r"write '/endoscope/master' or '/\*\*/master'"),
     ],
@@ -76,5 +76,5 @@ def test_a_rule_for_one_node_is_for_it_in_any_namespace():
     args = ['--ros-args', '-p', 'recorder:bag:=a:b:=c', '-p', 'watch:active:=true', '-p', 'keep:=1']
     assert given_to_nodes(args) == {'recorder': {'bag': 'a:b:=c'}, 'watch': {'active': True}}
     assert check_sections(args, HERE) == check_sections(args, '/') == []
-    with pytest.raises(ParameterError, match="there is no node 'recoder'; did you mean 'recorder'"):
+    with pytest.raises(ParameterError, match="there is no node 'recoder'; did you mean recorder"):
         check_sections(['--ros-args', '-p', 'recoder:bag:=a'], HERE)

@@ -66,7 +66,7 @@ def test_overrides_reach_the_dataclass():
         ({'on': 1}, "'on' is 1; give true or false"),
         ({'mode': 'bouc_wem'}, 'did you mean bouc_wen'),
         ({'names': 'x'}, "'names' is 'x'; give a list"),
-        ({'gian': 1.0}, "unknown parameter 'gian'; did you mean 'gain'"),
+        ({'gian': 1.0}, "unknown parameter 'gian'; did you mean gain"),
     ],
 )
 def test_each_mistake_is_one_clear_error(overrides, words):

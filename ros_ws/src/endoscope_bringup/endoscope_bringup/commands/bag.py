@@ -1,15 +1,16 @@
-"""`endoscope bag`: lists, describes, cuts and recovers recordings."""
+"""`endoscope bag`: lists, describes, cuts, recovers and exports recordings."""
 
 import argparse
 from pathlib import Path
 
+from endoscope_bringup.bag_export import add_export, export
 from endoscope_bringup.subcommands import add_json_option, print_json, within
 
 
 def add_parser(subparsers: argparse._SubParsersAction) -> None:
-    """Add `bag` with `list`, `info`, `cut` and `recover`."""
+    """Add `bag` with `list`, `info`, `cut`, `recover` and `export`."""
     parser = subparsers.add_parser(
-        'bag', help='describe a recording, cut it, recover a damaged one'
+        'bag', help='describe a recording, cut it, recover a damaged one, export it'
     )
     actions = parser.add_subparsers(dest='action', metavar='ACTION', required=True)
     listed = actions.add_parser(
@@ -64,6 +65,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     )
     recover.add_argument('bag', metavar='BAG', type=Path, help='rosbag2 folder or .mcap file')
     recover.add_argument('out', metavar='OUT', type=Path, help='the new recording')
+    add_export(actions)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -89,6 +91,8 @@ def run(args: argparse.Namespace) -> int:
         from endoscope_bags.copying import cut
 
         print(cut(args.bag, args.out, args.begin, args.end))
+    elif args.action == 'export':
+        return export(args)
     else:
         from endoscope_bags.copying import recover
 

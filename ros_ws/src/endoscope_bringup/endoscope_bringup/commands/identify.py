@@ -12,7 +12,7 @@ from endoscope_core.errors import FileError
 if TYPE_CHECKING:
     from endoscope_bags import Recording
     from endoscope_core.hysteresis.inverse import HysteresisParameters
-    from endoscope_core.identification import HysteresisRecording
+    from endoscope_core.identification import HysteresisRecording, UpdatedTable
 
 MODELS = (*HYSTERESIS_MODELS, PHYSICAL)
 
@@ -54,6 +54,8 @@ def run(args: argparse.Namespace) -> int:
             require_place(file)
     if args.table is not None and args.model == PHYSICAL:
         raise EndoscopeError('--table takes the name of a hysteresis model')
+    if args.table is not None:
+        _table(args)
     content = _of_bag(args)
     text = json.dumps(content, indent=1) + '\n'
     if args.out is None:
@@ -115,6 +117,18 @@ def _plant_of_bag(args: argparse.Namespace) -> dict[str, object]:
     return {'schema': 1, 'model': 'physical', 'joints': joints}
 
 
+def _table(args: argparse.Namespace) -> 'UpdatedTable | None':
+    """Return the table so far; FileError for one of another model."""
+    from endoscope_core.identification import UpdatedTable
+
+    if not args.table.is_file():
+        return None
+    table = UpdatedTable.load(args.table)
+    if table.model != args.model:
+        raise FileError(f'{args.table} is a table of {table.model}, not {args.model}')
+    return table
+
+
 def _extend(
     args: argparse.Namespace,
     recording: 'HysteresisRecording',
@@ -134,13 +148,8 @@ def _extend(
     commanded = recording.driver + Servo().lag * np.gradient(recording.driver, GRID_STEP)
     size = width_at_mid_height(commanded, recording.actual)
     entry = TableEntry(size, parameters, source)
-    if args.table.is_file():
-        table = UpdatedTable.load(args.table)
-        if table.model != args.model:
-            raise FileError(f'{args.table} is a table of {table.model}, not {args.model}')
-        table = table.extended(entry)
-    else:
-        table = UpdatedTable.of(args.model, [entry])
+    table = _table(args)
+    table = table.extended(entry) if table else UpdatedTable.of(args.model, [entry])
     table.save(args.table)
     _report(f'{args.table}: {len(table.entries)} entries, {math.degrees(size):.1f} deg added')
 

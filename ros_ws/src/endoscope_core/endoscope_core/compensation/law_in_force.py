@@ -110,20 +110,16 @@ class LawInForce:
 
     def figures(self, lead: float, gear: float) -> dict[str, object]:
         """What is in force and what is selected, with the `lead` in s and the rig's `gear`."""
-        mode, selected_by = self.selection
-        law = self.feedforward.law
-        values: dict[str, object] = {
+        law, found = self.feedforward.law, self.findings
+        return {
             'mode': law.mode,
-            'wanted_mode': mode,
-            'selected_by': selected_by,
+            'wanted_mode': self.selection.mode,
+            'selected_by': self.selection.selected_by,
             'lead': lead,
             'gear': gear,
+            'class_deg': None if found is None else found.class_deg,
+            **{joint: p.to_dict() for joint, p in zip(JOINTS, law.parameters, strict=False)},
         }
-        if self.findings is not None and self.findings.class_deg is not None:
-            values['class_deg'] = self.findings.class_deg
-        for joint, parameters in zip(JOINTS, law.parameters, strict=False):
-            values |= {f'{joint}.{key}': value for key, value in parameters.to_dict().items()}
-        return values
 
     def in_words(self, remedy: str) -> str:
         """What is compensated by, or why nothing is; `remedy` is how to calibrate."""

@@ -6,6 +6,7 @@ from endoscope_core.kinematics.constant_curvature import (
     Vertebrae,
     bending_from_orientation,
     centre_line,
+    tip_lever,
     tip_pose,
 )
 from endoscope_core.kinematics.robot_description import robot_description
@@ -25,5 +26,6 @@ __all__ = [
     'centre_line',
     'register_straight',
     'robot_description',
+    'tip_lever',
     'tip_pose',
 ]

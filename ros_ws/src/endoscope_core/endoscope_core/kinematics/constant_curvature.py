@@ -49,6 +49,16 @@ def tip_pose(bending: ArrayLike, length: float) -> tuple[Array, Array]:
     return position, orientation
 
 
+def tip_lever(bending: ArrayLike, length: float) -> float:
+    """Way of the tip across its own axis for a radian of bending, m.
+
+    The same in every direction: ``length (1 - cos(a)) / a**2``, bent (2,) by `a` rad in all.
+    So a moment on a joint is the force across the tip times this lever (virtual work).
+    """
+    angle = math.hypot(*np.atleast_1d(np.asarray(bending, dtype=float)))
+    return 0.5 * length * float(np.sinc(angle / (2.0 * math.pi))) ** 2
+
+
 def centre_line(bending: ArrayLike, length: float, points: int) -> Array:
     """Points (N, 3) in m along a section of `length` m from base to tip, bent (2,) in rad."""
     x, y = (float(v) for v in np.asarray(bending, dtype=float))

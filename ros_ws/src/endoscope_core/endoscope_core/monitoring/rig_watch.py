@@ -15,9 +15,9 @@ from endoscope_core.monitoring.prediction import (
     PredictionBank,
 )
 from endoscope_core.monitoring.rig_change import CHANGES, DIRECTIONS, DRIFT_S, SMALLEST, Part
-from endoscope_core.monitoring.samples import Samples
 from endoscope_core.monitoring.thresholds import THRESHOLDS
 from endoscope_core.physics.description import PlantDescription
+from endoscope_core.signals.samples import Samples
 
 Array = NDArray[np.float64]
 

@@ -24,6 +24,7 @@ def test_other_parameters_are_found_and_no_effect_is_named(corpus):
         assert estimate.in_band
 
 
+@pytest.mark.nightly
 def test_an_effect_is_found_beside_a_number_far_from_its_description(one_joint):
     true = one_joint.rig(
         EffectSpec('tracker_delay', 'bend_x', {'delay_s': 0.05}), wire_stiffness=2000.0
@@ -63,6 +64,7 @@ def test_a_law_of_no_known_form_is_a_function_at_its_place(corpus):
     assert with_term < 0.3 * without
 
 
+@pytest.mark.nightly
 def test_what_was_there_in_health_is_not_explained_again(one_joint):
     healthy = one_joint.rig(EffectSpec('gravity', 'bend_x', {'moment_nm': 0.0003}), **OTHER)
     bias = EffectSpec('tracker_bias', 'bend_x', {'bias_rad': 0.05})

@@ -13,11 +13,14 @@ from endoscope_explain.search.levels import JointSearch, Level, search
 from endoscope_explain.search.other_joint import stands_beside
 
 
-@pytest.fixture(scope='module', params=['load_cell_gain', 'cross_coupling'])
+@pytest.fixture(
+    scope='module',
+    params=[pytest.param('load_cell_gain', marks=pytest.mark.nightly), 'cross_coupling'],
+)
 def searched(record, request):
     """An effect, its search on `bend_y` as if `bend_x` stood still, and how `bend_x` moved."""
     effect = EffectSpec(request.param, 'bend_y', {})
-    recording = record(PlantDescription(effects=(effect,)), 12.0)
+    recording = record(PlantDescription(effects=(effect,)), 6.0)
     plant = PlantDescription()
     observations = observe(recording, plant)
     _, references = with_references(recording, observations, plant, 0.15, 2)

@@ -25,7 +25,7 @@ from endoscope_explain.search.screen import background, directions, gains, scree
 from endoscope_explain.search.term import LAGS, Term, effects, functions, starting_points
 
 
-@pytest.fixture
+@pytest.fixture(scope='module')
 def references(one_joint):
     """Makes the nominal plant, refitted and as described, of a rig with effects and functions."""
 
@@ -38,6 +38,12 @@ def references(one_joint):
         return nominal_references(observation, *packed_joint(plant, 'bend_x'))
 
     return made
+
+
+@pytest.fixture(scope='module')
+def sound(references):
+    """Of a rig as described."""
+    return references()
 
 
 def effect(name, **values):
@@ -72,8 +78,8 @@ def test_a_limit_is_screened_as_it_stands_and_not_where_nothing_reaches_it(refer
     assert max(reached) < 0.03
 
 
-def test_what_is_there_already_is_not_tried_again(references):
-    refitted, _ = references()
+def test_what_is_there_already_is_not_tried_again(sound):
+    refitted, _ = sound
     tried = {term.id for term in (*effects(refitted), *functions(refitted, refitted.residuals))}
     assert {'gravity', 'load_of_angle', 'contact'} <= tried
     with_function = Term(FUNCTIONS['load_of_angle'], family=_family(refitted)).added_to(
@@ -121,6 +127,7 @@ def test_an_effect_is_found_by_its_formula_with_nothing_left(references):
     assert decision.missing[0].p_value < 0.05
 
 
+@pytest.mark.nightly
 def test_two_effects_are_found_one_after_the_other(references):
     hidden = (
         effect('joint_inertia', inertia_kg_m2=2e-5),
@@ -131,8 +138,8 @@ def test_two_effects_are_found_one_after_the_other(references):
     assert is_noise(decision.chosen.fit)
 
 
-def test_nothing_is_searched_where_only_noise_is_left(references):
-    tried = search([references()], 2)
+def test_nothing_is_searched_where_only_noise_is_left(sound):
+    tried = search([sound], 2)
     assert tried.levels == ()
     assert decide(tried, 2).missing == ()
 
@@ -188,6 +195,7 @@ def test_other_numbers_stand_where_a_term_does_hardly_more():
     assert beside.best.terms == (gravity,)
 
 
+@pytest.mark.nightly
 def test_a_finer_sheath_alone_is_not_named(one_joint):
     """A rig whose friction has a profile finer than the fitted one lacks no physics."""
     plant = one_joint.rig()
@@ -206,8 +214,8 @@ def test_nothing_is_found_that_rigs_without_it_show_as_well():
     assert not replace(seen, judge=replace(seen.judge, predicts=False)).is_found
 
 
-def test_a_function_of_two_states_is_exported_as_a_product(references):
-    refitted, _ = references()
+def test_a_function_of_two_states_is_exported_as_a_product(sound):
+    refitted, _ = sound
     family = _family(refitted)
     alone = Term(family.place, family=family.scaled(1e-4))
     model = alone.added_to(refitted.model)
@@ -234,8 +242,8 @@ def test_a_function_of_two_states_is_exported_as_a_product(references):
     assert np.isfinite(outputs).all()
 
 
-def test_a_device_that_joints_share_has_one_number_in_the_plant(references):
-    refitted, _ = references()
+def test_a_device_that_joints_share_has_one_number_in_the_plant(sound):
+    refitted, _ = sound
     skew = next(term for term in effects(refitted) if term.id == 'clock_skew')
     fits = []
     for joint, rate in (('bend_x', 0.010), ('bend_y', 0.011)):
@@ -252,8 +260,8 @@ def test_a_device_that_joints_share_has_one_number_in_the_plant(references):
     pack(plant)
 
 
-def test_an_argument_that_lags_is_tried_with_several_lags_and_the_fit_may_move_them(references):
-    refitted, _ = references()
+def test_an_argument_that_lags_is_tried_with_several_lags_and_the_fit_may_move_them(sound):
+    refitted, _ = sound
     lagging = [
         term
         for term in functions(refitted, refitted.residuals)

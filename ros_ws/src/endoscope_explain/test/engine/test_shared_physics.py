@@ -15,6 +15,8 @@ from endoscope_explain.search.screen import background, directions
 from endoscope_explain.search.term import Term, effects, with_effect
 from endoscope_explain.shared_physics import shared_effects
 
+pytestmark = pytest.mark.nightly
+
 GAIN = 0.9
 TUBES = (0.8, 1.0)
 """Capstan exponents."""

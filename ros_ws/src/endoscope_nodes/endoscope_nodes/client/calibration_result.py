@@ -1,10 +1,10 @@
 """The message ``calibration/result``, how it is written and read, and its figures as numbers."""
 
 import contextlib
-import json
 import math
 from array import array
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -12,11 +12,18 @@ from sensor_msgs.msg import JointState
 
 from endoscope_core.calibration import with_zeros
 from endoscope_core.control import MotorLimits, PhysicalParameters, bending_range
-from endoscope_core.control.internal_model import PROFILE
 from endoscope_core.identification.law_choice import CalibrationFindings
+from endoscope_core.physics import JointParameters
 from endoscope_core.safety import BendingRange
 from endoscope_nodes.names import JOINTS, WIRES
-from endoscope_nodes.runtime.diagnostics import ERROR, OK, diagnostic_array, status
+from endoscope_nodes.runtime.diagnostics import (
+    ERROR,
+    OK,
+    diagnostic_array,
+    from_status,
+    status,
+    texts_of,
+)
 
 if TYPE_CHECKING:
     import numpy as np
@@ -42,65 +49,53 @@ def successful_result(
     `duration`, of the whole calibration, is in s; how far the plants can be bent follows from the
     rig's `limits`; `zeros` is what the zero of each load cell is off by, in N.
     """
-    verdict, plants, lost = found.verdict, found.plants, found.lost
-    values: dict[str, object] = {'class_deg': verdict.class_deg, 'probability': verdict.probability}
-    values |= {f'probability_{size}_deg': p for size, p in verdict.probabilities.items()}
+    verdict, lost = found.verdict, found.lost
+    low, high = verdict.interval or (None, None)
     size = verdict.expected_size if backlash is None else backlash
     source = 'cnn' if lost is None else 'plant'
-    if backlash is not None:
-        source = 'tracker'
-    values |= {
+    values = {
+        'class_deg': verdict.class_deg,
+        'probability': verdict.probability,
+        **{f'probability_{size}_deg': p for size, p in verdict.probabilities.items()},
         'backlash_size': size,
         'backlash_size_deg': math.degrees(size),
-        'backlash_size_from': source,
+        'backlash_size_from': source if backlash is None else 'tracker',
+        'regressed_size': verdict.size,
+        'regressed_size_low': low,
+        'regressed_size_high': high,
+        'duration': duration,
+        'zero_error': _by(WIRES, zeros),
+        'pretension_lost': _by(JOINTS, lost),
+        **{joint: plant.joint for joint, plant in zip(JOINTS, found.plants, strict=False)},
+        'reach': _by(JOINTS, [bending_range(plant.joint, limits) for plant in found.plants]),
     }
-    if verdict.size is not None and verdict.interval is not None:
-        values |= {
-            'regressed_size': verdict.size,
-            'regressed_size_low': verdict.interval[0],
-            'regressed_size_high': verdict.interval[1],
-        }
-    values['duration'] = duration
-    values |= _zero_values(zeros)
-    values |= {f'pretension_lost.{joint}': x for joint, x in zip(JOINTS, lost or (), strict=False)}
-    if plants:
-        values |= plant_values(plants)
-        for joint, plant in zip(JOINTS, plants, strict=True):
-            tube = bending_range(plant.joint, limits)
-            values |= {f'{REACH}{joint}.low': tube.low, f'{REACH}{joint}.high': tube.high}
     message = f'class {verdict.class_deg} deg with probability {verdict.probability:.3f}'
     message += found.lost_in_words()
-    return _message(stamp_ns, OK, with_zeros(message, zeros), values)
+    return diagnostic_array(stamp_ns, status(NAME, OK, with_zeros(message, zeros), values))
 
 
 def aborted_result(stamp_ns: int, reason: str, step: str, duration: float) -> DiagnosticArray:
     """Say that a calibration was aborted, where and why; ``duration`` in s."""
-    return _message(
-        stamp_ns,
-        ERROR,
-        f'aborted: {reason}',
-        {'reason': reason, 'step': step, 'duration': duration},
-    )
+    values = {'reason': reason, 'step': step, 'duration': duration}
+    return diagnostic_array(stamp_ns, status(NAME, ERROR, f'aborted: {reason}', values))
 
 
 def refused_result(
     stamp_ns: int, reason: str, duration: float, zeros: 'NDArray[np.float64] | None' = None
 ) -> DiagnosticArray:
     """State that the tube is outside all known classes, and why; ``duration`` in s."""
-    values: dict[str, object] = {
+    values = {
         'class_deg': NONE_OF_THEM,
         'reason': reason,
         'step': 'judging',
         'duration': duration,
-        **_zero_values(zeros),
+        'zero_error': _by(WIRES, zeros),
     }
-    return _message(stamp_ns, ERROR, with_zeros(reason, zeros), values)
+    return diagnostic_array(stamp_ns, status(NAME, ERROR, with_zeros(reason, zeros), values))
 
 
-def _zero_values(zeros: 'NDArray[np.float64] | None') -> dict[str, object]:
-    if zeros is None:
-        return {}
-    return {f'zero_error.{wire}': x for wire, x in zip(WIRES, zeros.tolist(), strict=True)}
+def _by[T](names: Sequence[str], values: 'Iterable[T] | None') -> dict[str, T]:
+    return dict(zip(names, () if values is None else values, strict=False))
 
 
 def numbers_of(result: DiagnosticArray) -> JointState:
@@ -122,10 +117,29 @@ def numbers_of(result: DiagnosticArray) -> JointState:
 def is_of_no_class(message: DiagnosticArray) -> bool:
     """Whether a result says that the tube is of no known class: what was known of it is void."""
     return any(
-        item.name == NAME
-        and any(v.key == 'class_deg' and v.value == NONE_OF_THEM for v in item.values)
+        item.name == NAME and texts_of(item).get('class_deg') == NONE_OF_THEM
         for item in message.status
     )
+
+
+@dataclass(frozen=True)
+class Reach:
+    """How far each joint can be bent, rad."""
+
+    bend_x: BendingRange
+    bend_y: BendingRange
+
+
+@dataclass(frozen=True)
+class _Usable:
+    """What a compensator can use of a result."""
+
+    class_deg: int
+    regressed_size: float | None = None
+    backlash_size: float | None = None
+    bend_x: JointParameters | None = None
+    bend_y: JointParameters | None = None
+    reach: Reach | None = None
 
 
 def findings_of(message: DiagnosticArray) -> CalibrationFindings | None:
@@ -133,48 +147,16 @@ def findings_of(message: DiagnosticArray) -> CalibrationFindings | None:
     for item in message.status:
         if item.name != NAME or item.level != OK:
             continue
-        values = {v.key: v.value for v in item.values}
         try:
-            size = values.get('regressed_size', values.get('backlash_size'))
+            found = from_status(_Usable, item)
+            size = found.backlash_size if found.regressed_size is None else found.regressed_size
+            plants = [joint for joint in (found.bend_x, found.bend_y) if joint is not None]
             return CalibrationFindings(
-                int(values['class_deg']),
-                None if size is None else float(size),
-                _plants_of(values),
-                _ranges_of(values),
+                found.class_deg,
+                size,
+                tuple(map(PhysicalParameters, plants)),
+                () if found.reach is None else (found.reach.bend_x, found.reach.bend_y),
             )
-        except (KeyError, ValueError):
+        except ValueError:
             return None
     return None
-
-
-def plant_values(plants: Sequence[PhysicalParameters]) -> dict[str, object]:
-    """Keys and values by which a result reports identified plants, one for each joint."""
-    return {
-        f'{joint}.{name}': value
-        for joint, plant in zip(JOINTS, plants, strict=True)
-        for name, value in plant.to_dict().items()
-    }
-
-
-def _plants_of(values: Mapping[str, str]) -> tuple[PhysicalParameters, ...]:
-    plants = []
-    for joint in JOINTS:
-        prefix = f'{joint}.'
-        own = {key.removeprefix(prefix): v for key, v in values.items() if key.startswith(prefix)}
-        if own:
-            profile = json.loads(own[PROFILE])
-            plants.append(PhysicalParameters.from_dict(own | {PROFILE: profile}))
-    return tuple(plants)
-
-
-def _ranges_of(values: Mapping[str, str]) -> tuple[BendingRange, ...]:
-    if not any(key.startswith(REACH) for key in values):
-        return ()
-    return tuple(
-        BendingRange(*(float(values[f'{REACH}{joint}.{end}']) for end in ('low', 'high')))
-        for joint in JOINTS
-    )
-
-
-def _message(stamp_ns: int, level: bytes, text: str, values: dict[str, object]) -> DiagnosticArray:
-    return diagnostic_array(stamp_ns, status(NAME, level, text, values))

@@ -17,6 +17,7 @@ from endoscope_core.errors import EndoscopeError
 from endoscope_core.exit_status import ClosedOnExit
 from endoscope_nodes import names
 from endoscope_nodes.client.order_feedback import feedback_of
+from endoscope_nodes.runtime.diagnostics import texts_of
 from endoscope_nodes.runtime.qos import profile
 from endoscope_nodes.runtime.streams import RawSubscription
 from endoscope_nodes.topics import Qos
@@ -224,7 +225,7 @@ def _healths(data: bytes, received_ns: int) -> dict[str, Health]:
         status.name: Health(
             status.level[0],
             status.message,
-            {item.key: item.value for item in status.values},
+            texts_of(status),
             stamp_ns,
             received_ns,
             message.header.frame_id,

@@ -1,6 +1,5 @@
 """The messages ``compensator/adopt`` and ``compensator/plant``, and who asks by them."""
 
-import json
 import threading
 import time
 from dataclasses import dataclass, replace
@@ -14,14 +13,21 @@ from endoscope_core.calibration.order_feedback import OrderState
 from endoscope_core.errors import FileError
 from endoscope_core.safety import AdoptionCode, BendingRange
 from endoscope_nodes import names
+from endoscope_nodes.client.calibration_result import Reach
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import PATIENCE_S, GraphError
-from endoscope_nodes.runtime.diagnostics import ERROR, OK, diagnostic_array, status
+from endoscope_nodes.runtime.diagnostics import (
+    ERROR,
+    OK,
+    diagnostic_array,
+    from_status,
+    status,
+    texts_of,
+)
 from endoscope_nodes.runtime.qos import EVENT
 
 REQUEST = 'adopt'
 IN_FORCE, ADOPTION = 'compensator: adopted plant', 'compensator: adoption'
-_REACH = 'reach.'
 _WITHDRAWN_S = 1.0
 
 
@@ -45,17 +51,15 @@ class AdoptionRequest:
     def message(self, stamp_ns: int) -> DiagnosticArray:
         """Write it, at a time in ns."""
         values = {'id': self.id, 'plant': self.plant}
-        message = diagnostic_array(stamp_ns, status(REQUEST, OK, '', values))
-        message.header.frame_id = self.session
-        return message
+        return diagnostic_array(stamp_ns, status(REQUEST, OK, '', values), session=self.session)
 
     @classmethod
     def of_message(cls, message: DiagnosticArray) -> 'AdoptionRequest | None':
         """Read it; None where it is none."""
         for part in message.status:
-            values = {item.key: item.value for item in part.values}
+            values = texts_of(part)
             if part.name == REQUEST and set(values) == {'id', 'plant'}:
-                return cls(values['id'], values['plant'], message.header.frame_id)
+                return cls(**values, session=message.header.frame_id)
         return None
 
 
@@ -68,63 +72,40 @@ class PlantInForce:
     before: str = ''  # hash of the plant before, which can be put into force again
     # What stands in the file and no inverse can know, or tracks better without.
     left_out: tuple[str, ...] = ()
-    # How far each of J joints may be bent in rad; empty where that is not known.
-    ranges: tuple[BendingRange, ...] = ()
+    reach: Reach | None = None  # None where that is not known
     words: str = ''  # the same for a person
     id: str = ''  # of the last request
     state: OrderState = OrderState.WAITING
     code: AdoptionCode = AdoptionCode.NONE
     answer: str = ''  # what became of it, in words
 
+    @property
+    def ranges(self) -> tuple[BendingRange, ...]:
+        """How far each of J joints may be bent in rad; empty where that is not known."""
+        return () if self.reach is None else (self.reach.bend_x, self.reach.bend_y)
+
     def message(self, stamp_ns: int, session: str) -> DiagnosticArray:
         """Write it, at a time in ns, of a motion session."""
-        values: dict[str, object] = {
-            'hash': self.hash,
-            'before': self.before,
-            'left_out': json.dumps(self.left_out),
-        }
-        for joint, within in zip(names.JOINTS, self.ranges, strict=False):
-            values |= {
-                f'{_REACH}{joint}.low': float(within.low),
-                f'{_REACH}{joint}.high': float(within.high),
-            }
-        values['plant'] = self.plant
-        level = ERROR if self.state == OrderState.REJECTED else OK
-        asked = {'id': self.id, 'state': self.state, 'code': self.code}
-        message = diagnostic_array(
-            stamp_ns,
-            status(IN_FORCE, OK, self.words, values),
-            status(ADOPTION, level, self.answer, asked),
+        own, asked = (
+            {key: getattr(self, key) for key in keys}
+            for keys in (('hash', 'before', 'left_out', 'reach', 'plant'), ('id', 'state', 'code'))
         )
-        message.header.frame_id = session
-        return message
+        level = ERROR if self.state == OrderState.REJECTED else OK
+        return diagnostic_array(
+            stamp_ns,
+            status(IN_FORCE, OK, self.words, own),
+            status(ADOPTION, level, self.answer, asked),
+            session=session,
+        )
 
     @classmethod
     def of_message(cls, message: DiagnosticArray) -> 'PlantInForce | None':
         """Read it; None where it is none."""
         part = {each.name: each for each in message.status}
-        if not {IN_FORCE, ADOPTION} <= set(part):
-            return None
-        own = {item.key: item.value for item in part[IN_FORCE].values}
-        asked = {item.key: item.value for item in part[ADOPTION].values}
-        known = [joint for joint in names.JOINTS if f'{_REACH}{joint}.low' in own]
         try:
-            return cls(
-                own['plant'],
-                own['hash'],
-                own['before'],
-                tuple(map(str, json.loads(own['left_out']))),
-                tuple(
-                    BendingRange(*(float(own[f'{_REACH}{joint}.{end}']) for end in ('low', 'high')))
-                    for joint in known
-                ),
-                part[IN_FORCE].message,
-                asked['id'],
-                OrderState(asked['state']),
-                AdoptionCode(asked['code']),
-                part[ADOPTION].message,
-            )
-        except (KeyError, ValueError, TypeError):
+            own, asked = part[IN_FORCE], part[ADOPTION]
+            return from_status(cls, own, asked, words=own.message, answer=asked.message)
+        except (KeyError, ValueError):
             return None
 
 

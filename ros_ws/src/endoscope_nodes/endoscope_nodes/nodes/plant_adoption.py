@@ -12,6 +12,7 @@ from endoscope_core.compensation.law_in_force import LawInForce, Selection
 from endoscope_core.control import AdoptedPlant, AdoptionError, adopted_plant
 from endoscope_core.safety import AdoptionCode
 from endoscope_nodes import names
+from endoscope_nodes.client.calibration_result import Reach
 from endoscope_nodes.client.plant_adoption import AdoptionRequest, PlantInForce
 from endoscope_nodes.runtime.beside import Beside
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
@@ -183,6 +184,6 @@ class PlantAdoption:
             before='' if before is None or before.plant is None else before.plant.hash,
             left_out=() if plant is None else plant.left_out,
             words=self._in_words(),
-            ranges=self._law.ranges,
+            reach=Reach(*self._law.ranges) if self._law.ranges else None,
         )
         self._out.publish(in_force.message(self._node.ticker.now_ns(), self._session.name))

@@ -6,7 +6,6 @@ leaves it with its defaults.  Here each of them is one error that names what wou
 """
 
 import dataclasses
-import difflib
 import re
 import typing
 from collections.abc import Callable, Iterator, Sequence
@@ -19,6 +18,7 @@ from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from endoscope_core.errors import nearest
 from endoscope_nodes.runtime.node_parameters import FOR_SESSION, OF_NODE
 from endoscope_nodes.runtime.parameters import ParameterError, checked, constraints
 
@@ -130,13 +130,8 @@ def check_overrides(nodes: list[Node]) -> None:
             known_elsewhere = any(name in declared[other] for other in nodes)
             if known_elsewhere and all(name in given[other] for other in nodes):
                 continue
-            near = difflib.get_close_matches(name, sorted(declared[node]), 1, 0.4)
-            hint = (
-                f"; did you mean '{near[0]}'?"
-                if near
-                else ('; it has ' + ', '.join(sorted(declared[node])))
-            )
-            raise ParameterError(f"{node.get_name()}: unknown parameter '{name}'{hint}")
+            hint = nearest(name, sorted(declared[node]))
+            raise ParameterError(f"{node.get_name()}: unknown parameter '{name}'; {hint}")
 
 
 def check_sections(args: Sequence[str], namespace: str) -> list[str]:
@@ -180,9 +175,7 @@ def _check(where: str, section: str, known: Sequence[str], namespace: str) -> bo
     """Tell whether a section is for a node in this namespace, if there can be such a node."""
     above, _, node = section.rpartition('/')
     if node not in (*_ANY, *known):
-        near = difflib.get_close_matches(node, known, 1)
-        hint = f"did you mean '{near[0]}'?" if near else f'there are {", ".join(known)}'
-        raise ParameterError(f"{where}: there is no node '{node}'; {hint}")
+        raise ParameterError(f"{where}: there is no node '{node}'; {nearest(node, known)}")
     here = namespace.rstrip('/')
     if here and not above and node not in _ANY:
         raise ParameterError(

@@ -4,13 +4,14 @@ Nothing here needs ROS; :mod:`endoscope_nodes.runtime.declared_parameters` decla
 """
 
 import dataclasses
-import difflib
 import math
 import typing
 from collections.abc import Iterable
 from typing import Any
 
-from endoscope_core.errors import EndoscopeError
+from endoscope_core.errors import EndoscopeError, nearest
+
+_WORDS = {bool: 'true or false', int: 'a whole number', float: 'a finite number', str: 'a text'}
 
 
 class ParameterError(EndoscopeError, ValueError):
@@ -20,10 +21,10 @@ class ParameterError(EndoscopeError, ValueError):
 def parameter(
     default: Any,
     description: str,
-    *,
     unit: str = '',
     low: float | None = None,
     high: float | None = None,
+    *,
     choices: tuple[str, ...] = (),
     dynamic: bool = False,
     file: bool = False,
@@ -34,18 +35,9 @@ def parameter(
     inclusive, for each number of a tuple; empty `choices` allow any string. A `file` has its whole
     path, so that a program in another folder finds it by the parameter.
     """
-    return dataclasses.field(
-        default=default,
-        metadata={
-            'description': description,
-            'unit': unit,
-            'low': low,
-            'high': high,
-            'choices': choices,
-            'dynamic': dynamic,
-            'file': file,
-        },
-    )
+    bounds = {'unit': unit, 'low': low, 'high': high, 'choices': choices}
+    others = {'description': description, 'dynamic': dynamic, 'file': file}
+    return dataclasses.field(default=default, metadata=bounds | others)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,15 +54,9 @@ class Described:
 
 def described(kind: type) -> tuple[Described, ...]:
     """Describe every parameter of a dataclass."""
+    known = ('unit', 'dynamic', 'description')
     return tuple(
-        Described(
-            f.name,
-            as_typed(f.default),
-            constraints(f),
-            f.metadata['unit'],
-            f.metadata['dynamic'],
-            f.metadata['description'],
-        )
+        Described(f.name, as_typed(f.default), constraints(f), *(f.metadata[key] for key in known))
         for f in dataclasses.fields(kind)
     )
 
@@ -119,31 +105,16 @@ def checked(node: str, field: dataclasses.Field, hint: Any, value: Any) -> Any:
 
 
 def _checked_one(where: str, field: dataclasses.Field, kind: Any, value: Any) -> Any:
-    constraint = constraints(field)
-    wanted = {
-        bool: 'true or false',
-        int: 'a whole number',
-        float: 'a finite number',
-        str: 'a text',
-    }[kind]
-    wanted += f', {constraint}' if constraint else ''
     if kind is float and type(value) is int:
         value = float(value)
-    if type(value) is not kind:
+    low, high, choices = (field.metadata[key] for key in ('low', 'high', 'choices'))
+    fits = type(value) is kind
+    if fits and kind in (int, float):
+        above, below = low is None or value >= low, high is None or value <= high
+        fits = math.isfinite(value) and above and below
+    if not fits:
+        wanted = ', '.join(filter(None, (_WORDS[kind], constraints(field))))
         raise ParameterError(f'{where} is {value!r}; give {wanted}')
-    if kind in (int, float):
-        low, high = field.metadata['low'], field.metadata['high']
-        if (
-            not math.isfinite(value)
-            or (low is not None and value < low)
-            or (high is not None and value > high)
-        ):
-            raise ParameterError(f'{where} is {value!r}; give {wanted}')
-    if kind is str and field.metadata['choices'] and value not in field.metadata['choices']:
-        raise ParameterError(f'{where} is {value!r}; give {wanted}{_nearest(value, field)}')
+    if choices and value not in choices:
+        raise ParameterError(f'{where} is {value!r}; {nearest(value, filter(None, choices))}')
     return value
-
-
-def _nearest(value: str, field: dataclasses.Field) -> str:
-    near = difflib.get_close_matches(value, field.metadata['choices'], 1, 0.5)
-    return f' (did you mean {near[0]}?)' if near else ''

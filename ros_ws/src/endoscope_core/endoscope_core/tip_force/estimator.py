@@ -1,0 +1,285 @@
+"""The force across the tip, with bounds, while the instrument moves."""
+
+import math
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.kinematics import tip_lever
+from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.effects import describe
+from endoscope_core.physics.effects.tracker_delay import EFFECT as TRACKER_DELAY
+from endoscope_core.physics.packing import pack
+from endoscope_core.signals.samples import Samples
+from endoscope_core.tip_force.external_moment import (
+    BLOCK_TICKS,
+    TICK_S,
+    Block,
+    ExternalMoment,
+    MomentSet,
+)
+
+Array = NDArray[np.float64]
+
+BLOCK_S = BLOCK_TICKS * TICK_S
+AHEAD_S = 2.0 * BLOCK_S
+"""By how much a force is later than its samples: the angle is the mean of what the tracker reads
+this long before and after."""
+_AVERAGED = 5
+_BOUND = 2.0
+"""Standard deviations of that mean within which the angle is."""
+LONGEST_GAP_S = 0.15
+"""Of motors, wires or tracker; after a longer one the memory of the sheaths is unknown."""
+SWEEPS, LEAST_RANGE_RAD = 2.0, 0.3
+"""Travel over the visited range, and that range in rad of the shaft, after which a joint's memory
+is that of the path: once to either end of it (return-point memory; Mayergoyz, 1991, ch. I)."""
+COVERED = 0.95
+"""Share of free motion in which zero lies within the bounds."""
+BEYOND_FREE = 1.5
+"""Over the largest misfit of free motion: where a force begins to be seen."""
+LEAST_FREE = 80
+"""Blocks of free motion, 2 s, from which bounds are known."""
+
+
+class State(StrEnum):
+    """Whether a force is known, and if not, why."""
+
+    KNOWN = 'known'
+    NO_SAMPLES = 'motors, load cells or tracker are silent'
+    UNKNOWN_MEMORY = 'every joint has to go through its range once both ways'
+    NOT_CALIBRATED = 'bounds come from motion in free space: run a calibration'
+
+
+@dataclass(frozen=True)
+class TipForce:
+    """Force on the tip across its axis at one time; what acts along the axis cannot be seen.
+
+    Attributes
+    ----------
+    time : float
+        s, as the samples.
+    force : array (2,)
+        N along x and y of the tip's frame, positive where it pushes towards a positive angle; NaN
+        for a joint that the plant does not have.
+    low, high : array (2,)
+        Bounds of both in N.
+    widened : array (2,)
+        By how much motion in free space has widened the bounds on either side, N; the rest of them
+        is what friction leaves open.
+    visible : float
+        Smallest force in N that would be seen now.
+    seen : bool
+        Whether something touches the tip.
+    """
+
+    time: float
+    force: Array
+    low: Array
+    high: Array
+    widened: Array
+    visible: float
+    seen: bool
+
+    @property
+    def size(self) -> float:
+        """Size of the force in N."""
+        return float(np.linalg.norm(np.nan_to_num(self.force)))
+
+    @property
+    def at_least(self) -> float:
+        """The smallest force in N within the bounds."""
+        nearest = np.clip(0.0, np.nan_to_num(self.low), np.nan_to_num(self.high))
+        return float(np.linalg.norm(nearest))
+
+    @property
+    def at_most(self) -> float:
+        """The largest force in N within the bounds."""
+        farthest = np.maximum(np.abs(self.low), np.abs(self.high))
+        return float(np.linalg.norm(np.nan_to_num(farthest)))
+
+
+class _Joint:
+    """Observer of one joint, what it has visited, and its misfit in free motion."""
+
+    def __init__(self, observer: ExternalMoment, delay_s: float) -> None:
+        self.observer, self.delay_s = observer, delay_s
+        self._way, self._low, self._high = 0.0, math.inf, -math.inf
+        self._shaft = math.nan
+        self.free: list[float] = []  # misfit of each block, N m
+        self.bound = self.least_seen = math.nan  # N m
+
+    @property
+    def memory_is_known(self) -> bool:
+        """Whether what was before the first sample is forgotten."""
+        visited = self._high - self._low
+        return visited >= LEAST_RANGE_RAD and self._way >= SWEEPS * visited
+
+    def follow(self, block: Block) -> MomentSet:
+        """As `ExternalMoment.follow`."""
+        shaft = block.shaft
+        if not math.isnan(self._shaft):
+            self._way += float(np.abs(np.diff(shaft, prepend=self._shaft)).sum())
+        self._shaft = float(shaft[-1])
+        self._low, self._high = min(self._low, shaft.min()), max(self._high, shaft.max())
+        return self.observer.follow(block)
+
+    def learn(self, moments: MomentSet) -> None:
+        """Add a block of free motion to those that the bounds are from."""
+        self.free.append(max(0.0, moments.low, -moments.high))
+        if len(self.free) >= LEAST_FREE:
+            self.bound = float(np.quantile(self.free, COVERED))
+            self.least_seen = max(self.bound, BEYOND_FREE * max(self.free))
+
+
+class TipForceEstimator:
+    """Force on the tip of a rig by its plant.
+
+    Samples are added to `motor` (J columns: shafts in rad), `wires` (2 J: both tensions of each
+    joint in N) and `tracker` (J: bending in rad) in any portions; `update` gives what can be
+    worked out. While `free` is set, nothing touches the tip, and the bounds are learnt.
+
+    Parameters
+    ----------
+    plant : PlantDescription
+        The rig with one or two joints. What depends on time since a recording began is left out.
+    section_length : float
+        Of the bending section in m.
+    """
+
+    def __init__(self, plant: PlantDescription, section_length: float) -> None:
+        lasting = [e for e in plant.effects if not describe(e.id).traits.depends_on_time]
+        self._plant = replace(plant, effects=tuple(lasting))
+        self._parameters, self._on = pack(self._plant)
+        self.section_length = section_length
+        self._noise = plant.sensors.tracker_noise
+        count = len(self._parameters)
+        self.motor, self.wires = Samples(count), Samples(2 * count)
+        self.tracker = Samples(count)
+        self._joints: list[_Joint] = []
+        self._learnt: list[tuple[float, float]] = []
+        self._end = math.nan
+        self._free = False
+        self._beyond = 0
+        self.state = State.NO_SAMPLES
+        self.restarts = 0
+        self.restarted_because = ''
+
+    @property
+    def free(self) -> bool:
+        """Whether nothing touches the tip."""
+        return self._free
+
+    @free.setter
+    def free(self, free: bool) -> None:
+        if free and not self._free:
+            for joint in self._joints:
+                joint.free = []
+        self._free = free
+
+    def update(self, until: float) -> list[TipForce]:
+        """Forces since the last call, from samples that are complete at a time in s."""
+        streams = {'motors': self.motor, 'load cells': self.wires, 'tracker': self.tracker}
+        found: list[TipForce] = []
+        if not all(samples.in_order for samples in streams.values()):
+            self._restart('the time of the samples has jumped back')
+        if not self._joints and not self._started():
+            return found
+        latest = AHEAD_S + max(joint.delay_s for joint in self._joints)
+        while True:
+            begin, end = self._end, self._end + BLOCK_S
+            enough = min(
+                (*self.motor.time[-1:], *self.wires.time[-1:], self.tracker.time[-1] - latest),
+            )
+            if enough < end and until < end + latest + LONGEST_GAP_S:
+                return found
+            for name, samples in streams.items():
+                flaw = samples.flaw(begin, end, LONGEST_GAP_S)
+                if flaw:
+                    self._restart(f'{name} were {flaw}'.replace('were no', 'gave no'))
+                    return found
+            force = self._judge(end)
+            if force is not None:
+                found.append(force)
+            self._end = end
+            for samples in streams.values():
+                samples.drop(begin - AHEAD_S)
+
+    def _started(self) -> bool:
+        if not all(len(s.time) for s in (self.motor, self.wires, self.tracker)):
+            return False
+        first = max(self.motor.time[0], self.wires.time[0], self.tracker.time[0] + AHEAD_S)
+        if self.motor.time[-1] < first:
+            return False
+        shafts = self.motor.between(np.array([first]))[0]
+        if not np.isfinite(shafts).all():
+            return False
+        for j, (p, on) in enumerate(zip(self._parameters, self._on, strict=True)):
+            delay_s = float(p[TRACKER_DELAY.first_parameter]) if on[TRACKER_DELAY.flag] else 0.0
+            joint = _Joint(ExternalMoment(p, on, float(shafts[j])), delay_s)
+            if self._learnt:
+                joint.bound, joint.least_seen = self._learnt[j]
+            self._joints.append(joint)
+        self._end = first
+        return True
+
+    def _restart(self, because: str) -> None:
+        """Begin with an unknown memory; bounds that were learnt stay."""
+        self._learnt = [(joint.bound, joint.least_seen) for joint in self._joints]
+        self._joints, self._beyond = [], 0
+        self.state = State.NO_SAMPLES
+        self.restarts += 1
+        self.restarted_because = because
+        for samples in (self.motor, self.wires, self.tracker):
+            samples.clear()
+
+    def _judge(self, end: float) -> TipForce | None:
+        ticks: Array = end + TICK_S * np.arange(1 - BLOCK_TICKS, 1, dtype=np.float64)
+        shafts = self.motor.between(ticks)
+        tensions = self.wires.between(np.array([end]))[0].reshape(-1, 2)
+        around = end + np.linspace(-AHEAD_S, AHEAD_S, _AVERAGED)
+        near = np.stack(
+            [
+                np.interp(around + joint.delay_s, self.tracker.time, column)
+                for joint, column in zip(self._joints, self.tracker.values.T, strict=True)
+            ]
+        )
+        angles = near.mean(axis=1).tolist()
+        # Where the joint is accelerated by a, the mean is off by a BLOCK_S^2, a quarter of the
+        # second difference, which noise has a part in.
+        second = near[:, 0] - 2.0 * near[:, _AVERAGED // 2] + near[:, -1]
+        curved = np.maximum(0.0, second**2 - 6.0 * self._noise**2) / 16.0
+        half_widths = _BOUND * np.sqrt(self._noise**2 / _AVERAGED + curved)
+        sets = []
+        for j, joint in enumerate(self._joints):
+            other = angles[1 - j] if len(angles) > 1 else 0.0
+            shaft = np.ascontiguousarray(shafts[:, j])
+            block = Block(shaft, angles[j], float(half_widths[j]), other, tensions[j])
+            sets.append(joint.follow(block))
+        if not all(joint.memory_is_known for joint in self._joints):
+            self.state = State.UNKNOWN_MEMORY
+            return None
+        if self._free:
+            for joint, moments in zip(self._joints, sets, strict=True):
+                joint.learn(moments)
+        if any(math.isnan(joint.bound) for joint in self._joints):
+            self.state = State.NOT_CALIBRATED
+            return None
+        self.state = State.KNOWN
+        return self._force(end, angles, sets)
+
+    def _force(self, time: float, angles: list[float], sets: list[MomentSet]) -> TipForce:
+        lever = tip_lever(angles, self.section_length)
+        force, low, high, widened = (np.full(2, math.nan) for _ in range(4))
+        touched, visible = False, 0.0
+        for j, (joint, moments) in enumerate(zip(self._joints, sets, strict=True)):
+            force[j] = moments.likely / lever
+            widened[j] = joint.bound / lever
+            low[j] = moments.low / lever - widened[j]
+            high[j] = moments.high / lever + widened[j]
+            touched |= max(moments.low, -moments.high) > joint.least_seen
+            half = 0.5 * (moments.high - moments.low)
+            visible = max(visible, (half + joint.least_seen) / lever)
+        self._beyond = self._beyond + 1 if touched else 0
+        return TipForce(time, force, low, high, widened, visible, self._beyond > 1)

@@ -1,0 +1,179 @@
+"""Rigs of both simulators that are identified in free space, and then touch an obstacle."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from endoscope_core.control.internal_model import PhysicalParameters
+from endoscope_core.control.limits import MotorLimits
+from endoscope_core.control.physical_inverse import PhysicalInverse
+from endoscope_core.kinematics import tip_lever
+from endoscope_core.physics import EffectSpec, PlantDescription
+from endoscope_core.rig import shipped_rig
+from endoscope_core.tip_force import TipForce, TipForceEstimator
+from endoscope_explain.fit.model import joint_of, packed_joint
+from endoscope_explain.fit.nominal import nominal_references
+from endoscope_explain.observe.observation import observe
+from endoscope_explain.recording import RigRecording
+from endoscope_lab.concealed import another_rig, motions, readings, rigs
+
+Array = NDArray[np.float64]
+
+SIMULATORS = ('kernel', 'sliding nodes')
+STIFFNESS = (20.0, 2000.0)
+"""Of an obstacle, N/m."""
+DEPTH = (0.2, 0.8)
+"""Where it stands, of the largest angle that the hand asks for."""
+_HERTZ_RAD = 0.05
+"""Depth at which the round obstacle of sliding nodes is as stiff as drawn."""
+_PORTION_S = 0.1
+"""In which samples arrive."""
+
+
+@dataclass(frozen=True)
+class Touched:
+    """What was worked out of one rig's teleoperation, N samples."""
+
+    forces: tuple[TipForce, ...]
+    true: Array  # (N, J), N across the tip
+
+
+class _Rig:
+    """A drawn rig: its description, its truth, and what it answers to a motion."""
+
+    def __init__(self, generator: np.random.Generator, simulator: str) -> None:
+        self._other = simulator == SIMULATORS[1]
+        self.described = rigs.described_rig(generator, 1 if self._other else 2)
+        true = rigs.true_rig(generator, self.described)
+        # Half of the rigs have another form of sheath.
+        other_form = generator.random() < 0.5
+        self.true = rigs.other_sheath(generator, true) if other_form else true
+
+    def record(
+        self, shaft: Array, seed: int, obstacle: 'Obstacle | None' = None
+    ) -> tuple[RigRecording, Array]:
+        """Readings with noise, and the true angles (M, J) in rad at the tracker's stamps."""
+        if self._other:
+            (joint,) = self.true.joints.values()
+            laws = another_rig.Laws()
+            if obstacle is not None:
+                hertz = obstacle.stiffness / math.sqrt(_HERTZ_RAD)
+                laws = replace(laws, stop_rad=abs(obstacle.angle), stop_stiffness=hertz)
+            clean = another_rig.read(joint, laws, shaft)
+        else:
+            effects = () if obstacle is None else (obstacle.effect(self.true),)
+            clean = readings.read(replace(self.true, effects=effects), shaft)
+        names, sensors = self.true.joint_names(), self.true.sensors
+        return readings.as_sensed(clean, names, sensors, seed), clean.bending
+
+    def moment(self, obstacle: 'Obstacle', bending: Array) -> Array:
+        """Moments (M, J) in N m that the obstacle exerts at true angles (M, J) in rad."""
+        moments = np.zeros_like(bending)
+        q = bending[:, obstacle.joint]
+        if self._other:
+            deep = np.maximum(0.0, np.abs(q) - abs(obstacle.angle))
+            push = obstacle.stiffness / math.sqrt(_HERTZ_RAD) * deep**1.5
+            moments[:, obstacle.joint] = -np.sign(q) * push
+        else:
+            side = math.copysign(1.0, obstacle.angle)
+            deep = np.maximum(0.0, side * (q - obstacle.angle))
+            moments[:, obstacle.joint] = -side * obstacle.stiffness * deep
+        return moments
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """Something that one joint meets."""
+
+    joint: int
+    angle: float  # where, rad
+    stiffness: float  # N m/rad
+
+    def effect(self, plant: PlantDescription) -> EffectSpec:
+        values = {'angle_rad': self.angle, 'stiffness': self.stiffness}
+        return EffectSpec('contact', plant.joint_names()[self.joint], values)
+
+
+def touched(simulator: str, seed: int, obstacle: bool = True, seconds: float = 30.0) -> Touched:
+    """Identify a drawn rig, learn its bounds in free teleoperation, and have it touch something."""
+    generator = np.random.default_rng([seed, SIMULATORS.index(simulator)])
+    rig = _Rig(generator, simulator)
+    count = len(rig.true.joints)
+    known, _ = rig.record(motions.commissioning(generator, count), seed)
+    plant = identified(known, rig.described)
+    estimator = TipForceEstimator(plant, shipped_rig().instrument.section_length)
+    gear = shipped_rig().joints.gear
+    free = motions.teleoperation(generator, count)
+    estimator.free = True
+    _watched(estimator, rig.record(_compensated(plant, free), seed + 1)[0], 0.0)
+    estimator.free = False
+    asked = np.concatenate(
+        [
+            motions.teleoperation(generator, count)
+            for _ in range(math.ceil(seconds / motions.HAND_S))
+        ]
+    )
+    met = _drawn(generator, np.abs(asked).max(axis=0) / gear) if obstacle else None
+    recording, bending = rig.record(_compensated(plant, asked), seed + 2, met)
+    # Later than the motion before by more than any gap: the memory is found again.
+    later = known.duration + motions.HAND_S
+    forces = _watched(estimator, recording, later)
+    lever = np.array([tip_lever(q, estimator.section_length) for q in bending])
+    moments = rig.moment(met, bending) if met else np.zeros_like(bending)
+    stamps = recording.bending.time + later
+    at = np.array([force.time for force in forces])
+    true = [np.interp(at, stamps, column / lever) for column in moments.T]
+    return Touched(tuple(forces), np.stack(true, axis=1))
+
+
+def identified(recording: RigRecording, described: PlantDescription) -> PlantDescription:
+    """The nominal plant fitted to a recording in free space, as `endoscope explain` begins."""
+    joints = {}
+    for observation in observe(recording, described):
+        fitted, _ = nominal_references(observation, *packed_joint(described, observation.joint))
+        joints[observation.joint] = joint_of(fitted.model.packed(fitted.theta)[0])
+    return replace(described, joints=joints)
+
+
+def _drawn(generator: np.random.Generator, largest: Array) -> Obstacle:
+    joint = int(generator.integers(len(largest)))
+    side = float(generator.choice([-1.0, 1.0]))
+    angle = side * generator.uniform(*DEPTH) * float(largest[joint])
+    lever = tip_lever([angle], shipped_rig().instrument.section_length)
+    across = math.exp(generator.uniform(*np.log(STIFFNESS)))
+    return Obstacle(joint, angle, across * lever**2)
+
+
+def _compensated(plant: PlantDescription, shaft: Array) -> Array:
+    """Shaft commands (N, J) in rad by the plant's inverse for those of a hand without one."""
+    rig, tick = shipped_rig(), 1.0 / motions.RATE
+    desired = shaft / rig.joints.gear
+    speed = np.gradient(desired, tick, axis=0)
+    sent = np.empty_like(desired)
+    for j, joint in enumerate(plant.joints.values()):
+        inverse = PhysicalInverse(PhysicalParameters(joint), MotorLimits.of(rig))
+        inverse.begin(0.0, float(desired[0, j]), float(speed[0, j]))
+        sent[:, j] = [
+            inverse.wanted(q, v, tick)
+            for q, v in zip(desired[:, j].tolist(), speed[:, j].tolist(), strict=True)
+        ]
+    return rig.joints.gear * sent
+
+
+def _watched(estimator: TipForceEstimator, recording: RigRecording, later: float) -> list[TipForce]:
+    """Forces from a recording whose stamps are later by so many s, in portions as they arrive."""
+    streams = (
+        (estimator.motor, recording.shaft_position),
+        (estimator.wires, recording.tension),
+        (estimator.tracker, recording.bending),
+    )
+    found = []
+    for begin in np.arange(0.0, recording.duration, _PORTION_S):
+        end = begin + _PORTION_S
+        for samples, series in streams:
+            rows = slice(*np.searchsorted(series.time, [begin, end]))
+            samples.append(series.time[rows] + later, series.values[rows])
+        found += estimator.update(later + end)
+    return found
