@@ -49,6 +49,12 @@ def with_explanation(case, **fields):
     return dataclasses.replace(case, explanation=explanation, **mine)
 
 
+def with_recording(case, recording):
+    """The case of another recording, with the same findings."""
+    audit = dataclasses.replace(case.audit, recording=recording)
+    return dataclasses.replace(case, inputs=dataclasses.replace(case.inputs, audit=audit))
+
+
 def text_of(page):
     """What a reader sees at first: no drawings, no tables that are closed, no tags."""
     text = re.sub(r'<(svg|style|script|details).*?</\1>', ' ', page, flags=re.DOTALL)
@@ -82,8 +88,7 @@ def consistent(stribeck_case, record):
         augmented=refitted,
         fit=ladder,
         ladder=ladder,
-        recording=recording,
-        audit=AuditReport(recording, ()),
+        inputs=dataclasses.replace(stribeck_case.inputs, audit=AuditReport(recording, ())),
         places=(),
         cuts=(),
     )
@@ -106,9 +111,8 @@ def test_a_page_says_of_what_kind_of_rig_its_recording_is(page, stribeck_case):
     rig = RigKind(Kind.EMULATED, 'endoscope 9')
     of_emulators = dataclasses.replace(stribeck_case.recording, rig_kind=rig)
     made = Provenance('bags/rig', 'a1' * 32, '', '', '1.2', '', 'today')
-    audit = dataclasses.replace(stribeck_case.audit, recording=of_emulators)
-    inputs = dataclasses.replace(stribeck_case.inputs, audit=audit)
-    told = html_page(dataclasses.replace(stribeck_case, inputs=inputs, provenance=made))
+    case = dataclasses.replace(stribeck_case, provenance=made)
+    told = html_page(with_recording(case, of_emulators))
     assert 'rig emulated (endoscope 9)' in text_of(told)
 
 
@@ -295,7 +299,7 @@ def test_what_did_not_move_is_left_out(consistent):
     shaft = consistent.recording.shaft_position
     held = Series.of(shaft.topic, shaft.time, shaft.values * [1.0, 0.0])
     recording = dataclasses.replace(consistent.recording, command=command, shaft_position=held)
-    case = dataclasses.replace(consistent, recording=recording)
+    case = with_recording(consistent, recording)
     assert moving_joints(recording) == ('bend_x',)
     signals = judged(case, case.ladder)['nominal']
     assert signals
@@ -352,7 +356,7 @@ def test_slips_that_nothing_predicts_are_said(consistent):
     spiky[burst, 0] += 0.4 * rng.standard_normal((int(burst.sum()), 2))
     tension = dataclasses.replace(consistent.recording.tension, values=spiky)
     recording = dataclasses.replace(consistent.recording, tension=tension)
-    text = text_of(html_page(dataclasses.replace(consistent, recording=recording)))
+    text = text_of(html_page(with_recording(consistent, recording)))
     assert re.search(r'bend_x: wires stick and slip.*their scatter of [\d.]+ N', text)
 
 
