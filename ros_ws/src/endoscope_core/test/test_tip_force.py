@@ -134,8 +134,9 @@ def test_numbers_that_are_none_start_anew(stream: str) -> None:
     estimator = _calibrated(plant)
     samples = getattr(estimator, stream)
     samples.append([samples.time[-1] + 1e-3], np.full(samples.columns, np.nan))
-    time = samples.time[-1]
-    for each in (estimator.motor, estimator.wires, estimator.tracker):
+    streams = (estimator.motor, estimator.wires, estimator.tracker)
+    time = max(each.time[-1] for each in streams)
+    for each in streams:
         each.append(time + np.array([0.01, 0.02]), np.zeros((2, each.columns)))
     found = estimator.update(time + 1.0)
     assert np.isfinite([f.force[0] for f in found]).all()

@@ -30,7 +30,7 @@ this long before and after."""
 _AVERAGED = 5
 _BOUND = 2.0
 """Standard deviations of that mean within which the angle is."""
-_GAP_S, _TRACKER_GAP_S = 0.05, 0.15
+_GAP_S, _TRACKER_GAP_S = AHEAD_S, 0.15
 """Longest of motors and load cells, and of the tracker; after a longer one the memory of the
 sheaths is unknown."""
 _LATE_S = 0.3
@@ -190,8 +190,8 @@ class TipForceEstimator:
         while self._joints or self._started():
             end = self._end + BLOCK_S
             latest = end + AHEAD_S + max(joint.delay_s for joint in self._joints)
-            complete = self.motor.time[-1:] >= end and self.wires.time[-1:] >= end
-            if not (complete and self.tracker.time[-1:] >= latest) and until < latest + _LATE_S:
+            newest = min(samples.time[-1] for samples in self._streams.values())
+            if newest < latest and until < latest + _LATE_S:
                 break
             flaw = self._flaw(end, latest)
             if flaw:
@@ -207,9 +207,10 @@ class TipForceEstimator:
 
     def _flaw(self, end: float, latest: float) -> str:
         """Why the samples do not show a block, in words; empty if they do."""
-        ends = {'tracker': (latest, _TRACKER_GAP_S)}
+        # What is interpolated at the end needs a sample after it.
         for name, samples in self._streams.items():
-            last, longest = ends.get(name, (end, _GAP_S))
+            of_tracker = samples is self.tracker
+            last, longest = (latest, _TRACKER_GAP_S) if of_tracker else (end + _GAP_S, _GAP_S)
             flaw = samples.flaw(self._end, last, longest)
             if flaw:
                 return f'{name} were {flaw}'.replace('were no', 'gave no')
