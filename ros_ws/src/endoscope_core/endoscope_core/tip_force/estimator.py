@@ -212,6 +212,8 @@ class TipForceEstimator:
             of_tracker = samples is self.tracker
             last, longest = (latest, _TRACKER_GAP_S) if of_tracker else (end + _GAP_S, _GAP_S)
             flaw = samples.flaw(self._end, last, longest)
+            if not flaw and not np.isfinite(samples.between(np.array([last]))).all():
+                flaw = 'no numbers'
             if flaw:
                 return f'{name} were {flaw}'.replace('were no', 'gave no')
         return ''
