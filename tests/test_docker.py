@@ -93,6 +93,7 @@ def test_rig_and_plant_files_are_named_by_the_environment(files) -> None:
                 'load_cells',
                 'em_tracker',
                 'watch',
+                'tip_force',
             )
             assert ('/given/plant.yaml' in used) == simulated, name
             parameters = re.findall(r'-p (\w+):=', service['command'])

@@ -24,7 +24,7 @@ from launch_ros.substitutions import FindPackageShare
 PROGRAMS = (
     *('motor_driver', 'load_cells', 'em_tracker'),
     *('supervisor', 'compensator', 'controller', 'calibration', 'master'),
-    *('instrument_model', 'watch', 'recorder'),
+    *('instrument_model', 'watch', 'tip_force', 'recorder'),
 )
 
 

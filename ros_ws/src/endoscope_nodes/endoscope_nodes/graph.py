@@ -27,6 +27,7 @@ from endoscope_nodes.nodes.motor_driver import MotorDriverNode
 from endoscope_nodes.nodes.recorder import RecorderNode
 from endoscope_nodes.nodes.simulation_clock import SelfStartingClock
 from endoscope_nodes.nodes.supervisor import SupervisorNode
+from endoscope_nodes.nodes.tip_force import TipForceNode
 from endoscope_nodes.nodes.watch import WatchNode
 from endoscope_nodes.program import CHECK, REAL_TIME, words_for_nobody
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
@@ -36,7 +37,7 @@ from endoscope_nodes.runtime.runtime import Runtime, run
 # The motor driver beats first: the plant advances under the command of the tick before.
 SLAVE_NODES = (MotorDriverNode, LoadCellsNode, EmTrackerNode, SupervisorNode)
 CONTROL_NODES = (CompensatorNode, ControllerNode, CalibrationNode, MasterNode)
-SHOWING_NODES = (InstrumentModelNode, WatchNode)
+SHOWING_NODES = (InstrumentModelNode, WatchNode, TipForceNode)
 ALL_NODES = (*SLAVE_NODES, *CONTROL_NODES, *SHOWING_NODES, RecorderNode)
 
 

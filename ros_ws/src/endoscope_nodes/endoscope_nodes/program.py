@@ -136,6 +136,11 @@ watch = Program(
     'Compares the rig with its plant while it moves, where it is switched on, and reports that the '
     'rig no longer matches its plant, and where.',
 )
+tip_force = Program(
+    'tip_force',
+    'nodes.tip_force:TipForceNode',
+    'Works out from wires, motors and tracker with what force something pushes the tip aside.',
+)
 recorder = Program(
     'recorder',
     'nodes.recorder:RecorderNode',
@@ -154,7 +159,8 @@ simulation_clock = Program(
 
 _COMPOSED = (
     *(motor_driver, load_cells, em_tracker, supervisor),
-    *(compensator, controller, calibration, master, instrument_model, watch, recorder),
+    *(compensator, controller, calibration, master, instrument_model, watch, tip_force),
+    recorder,
 )
 PROGRAMS = {program.nodes[0]: program for program in (*_COMPOSED, replay, simulation_clock)}
 """The program of each node of the package, by node name."""

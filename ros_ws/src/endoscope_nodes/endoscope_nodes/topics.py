@@ -89,7 +89,7 @@ TOPICS = (
           '`angular.y` in rad/s or, where both are zero, `linear.x` and `linear.y` in m/s; the '
           'rest is ignored and reported; `header.frame_id` the motion session', one_sender=True),
     GraphTopic(names.SLAVE_MEASURED, _JOINT_STATE, *_SENSOR, ('em_tracker',),
-          (*_MOVERS, 'calibration', 'instrument_model', 'watch'), '40 Hz',
+          (*_MOVERS, 'calibration', 'instrument_model', 'watch', 'tip_force'), '40 Hz',
           'bending by the EM tracker: `position` in rad of `bend_x` and `bend_y`', one_sender=True),
     GraphTopic(names.MOTOR_COMMAND, _JOINT_STATE, *_COMMANDS, ('compensator',), ('motor_driver',),
           _STREAM, 'command to the shafts after compensation: `position` in rad of `motor_x` and '
@@ -99,15 +99,20 @@ TOPICS = (
           'what the motor driver made of all commands: `position` in rad to which the shafts '
           '`motor_x` and `motor_y` are sent from the stamp on', one_sender=True),
     GraphTopic(names.MOTOR_MEASURED, _JOINT_STATE, *_SENSOR, ('motor_driver',),
-          (*_MOVERS, 'calibration', 'supervisor', 'watch', 'load_cells'),
+          (*_MOVERS, 'calibration', 'supervisor', 'watch', 'tip_force', 'load_cells'),
           '1 kHz simulated, as the bus carries on hardware',
           '`position` in rad, `velocity` in rad/s and `effort` in N m of the shafts `motor_x` and '
           '`motor_y`', one_sender=True),
     GraphTopic(names.WIRES_MEASURED, _JOINT_STATE, *_SENSOR, ('load_cells',),
-          ('calibration', 'supervisor', 'watch'),
+          ('calibration', 'supervisor', 'watch', 'tip_force'),
           '1 kHz simulated, as the transmitter is read on hardware',
           '`effort`: tension in N of `wire_x_pos`, `wire_x_neg`, `wire_y_pos` and `wire_y_neg`',
           one_sender=True),
+    GraphTopic(names.TIP_FORCE, 'geometry_msgs/msg/WrenchStamped', *_SENSOR, ('tip_force',), (),
+          '40 Hz, 0.1 s late, where it is known',
+          "force on the tip across its axis in N, `force.x` and `force.y` in the tip's frame, "
+          'positive where it pushes towards a positive angle; `force.z`, along the axis, cannot be '
+          'seen and is NaN, and torques are taken for zero. Bounds are on `/diagnostics`'),
     GraphTopic(names.TRACKER_POSE, 'geometry_msgs/msg/PoseStamped', *_SENSOR, ('em_tracker',), (),
           '40 Hz', "pose of the tip in the frame of the instrument's base: m, and a quaternion"),
     GraphTopic(names.CALIBRATION_COMMAND, _JOINT_STATE, *_COMMANDS, ('calibration',), _MOVERS,
@@ -128,7 +133,8 @@ TOPICS = (
           'bend as `reach.bend_x.low` and `reach.bend_x.high` in rad. After an abort the level is '
           'ERROR, with `reason` and `step`; for tensions that neither explains it is ERROR, with '
           '`reason` and `class_deg` `none`, and nothing is compensated', one_sender=True),
-    GraphTopic(names.CALIBRATION_FEEDBACK, _DIAGNOSTICS, *_RESULTS, ('calibration',), (),
+    GraphTopic(names.CALIBRATION_FEEDBACK, _DIAGNOSTICS, *_RESULTS, ('calibration',),
+          ('tip_force',),
           'on change and 10 Hz while it calibrates or goes home, latched',
           'status `calibration: order`, for programs: `order` is `calibrate` or `home`, `id` the '
           'time in ns at which it was given, or just after it where another has that, `state` is '
@@ -150,8 +156,8 @@ TOPICS = (
           'status `compensator: model`: `mode` in force, `wanted_mode`, `selected_by`, '
           "`class_deg`, `lead` in s, `gear`, and the mode's parameters of each joint as "
           '`bend_x.…`', one_sender=True),
-    GraphTopic(names.COMPENSATOR_PLANT, _DIAGNOSTICS, *_RESULTS, ('compensator',), ('master',
-          'watch'),
+    GraphTopic(names.COMPENSATOR_PLANT, _DIAGNOSTICS, *_RESULTS, ('compensator',),
+          ('master', 'watch', 'tip_force'),
           _LATCHED_STATE,
           'status `compensator: adopted plant`: `hash`, the first digits of the SHA-256 of the '
           'plant file in force, and of the one before as `before`, `left_out` of its inverse, how '

@@ -40,10 +40,12 @@ SWEEPS, LEAST_RANGE_RAD = 2.0, 0.3
 is that of the path: once to either end of it (return-point memory; Mayergoyz, 1991, ch. I)."""
 COVERED = 0.95
 """Share of free motion in which zero lies within the bounds."""
-BEYOND_FREE = 1.5
-"""Over the largest misfit of free motion: where a force begins to be seen."""
-LEAST_FREE = 80
-"""Blocks of free motion, 2 s, from which bounds are known."""
+FALSE_ALARM_S = 20.0 * 3600.0
+"""Of motion in free space, in which one block may show as much as a force that is seen."""
+TAIL = 0.1
+"""Share of free motion that shows how rare larger misfits are."""
+LEAST_FREE = 100
+"""Blocks of free motion, 2.5 s, from which bounds are known: ten in the tail."""
 
 
 class State(StrEnum):
@@ -52,7 +54,7 @@ class State(StrEnum):
     KNOWN = 'known'
     NO_SAMPLES = 'motors, load cells or tracker are silent'
     UNKNOWN_MEMORY = 'every joint has to go through its range once both ways'
-    NOT_CALIBRATED = 'bounds come from motion in free space: run a calibration'
+    NOT_CALIBRATED = 'its bounds come from motion in free space: calibrate with the sinusoid'
 
 
 @dataclass(frozen=True)
@@ -130,10 +132,17 @@ class _Joint:
 
     def learn(self, moments: MomentSet) -> None:
         """Add a block of free motion to those that the bounds are from."""
-        self.free.append(max(0.0, moments.low, -moments.high))
-        if len(self.free) >= LEAST_FREE:
-            self.bound = float(np.quantile(self.free, COVERED))
-            self.least_seen = max(self.bound, BEYOND_FREE * max(self.free))
+        # By how much zero is outside of the set; negative within it.
+        self.free.append(max(moments.low, -moments.high))
+        if len(self.free) < LEAST_FREE:
+            return
+        self.bound = max(0.0, float(np.quantile(self.free, COVERED)))
+        # What exceeds a high level does so by an exponentially distributed amount (Pickands,
+        # Ann. Statist. 3(1), 1975, of a light tail).
+        level = float(np.quantile(self.free, 1.0 - TAIL))
+        beyond = [misfit - level for misfit in self.free if misfit > level]
+        rarity = math.log(len(beyond) / len(self.free) * FALSE_ALARM_S / BLOCK_S)
+        self.least_seen = max(self.bound, level + float(np.mean(beyond)) * rarity)
 
 
 class TipForceEstimator:

@@ -1,74 +1,36 @@
 """Watches whether the rig that moves still matches its plant, and reports it."""
 
-from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from numpy.typing import NDArray
-from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from threadpoolctl import threadpool_limits
 
-from endoscope_bags.cdr_decoding import Payloads
-from endoscope_bags.errors import BagError
-from endoscope_bags.joint_state_series import JointStateSeries, decode_joint_states
 from endoscope_core.errors import FileError
 from endoscope_core.monitoring import DetectedChange, RigWatch
 from endoscope_core.monitoring.rig_watch import BLOCK_S, LEARNT, WINDOWS
 from endoscope_core.monitoring.thresholds import FALSE_ALARMS_PER_HOUR
 from endoscope_core.physics import PlantDescription
-from endoscope_core.physics.plant_file import plant_from_mapping
-from endoscope_core.schema import parse_yaml
-from endoscope_nodes import names, topics
+from endoscope_nodes import names
 from endoscope_nodes.client.plant_adoption import PlantInForce
 from endoscope_nodes.runtime.beside import Beside
 from endoscope_nodes.runtime.diagnostics import OK, STALE, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext, load_slave
 from endoscope_nodes.runtime.node_parameters import WatchParameters
-from endoscope_nodes.runtime.qos import EVENT, RESULT, profile
-from endoscope_nodes.runtime.streams import RawSubscription
+from endoscope_nodes.runtime.joint_readings import JointReadings
+from endoscope_nodes.runtime.qos import EVENT, RESULT
 
 _SECOND = 1_000_000_000
-# Of a stream at 1 kHz, four times what comes from one look to the next.
-_ASKED = profile(replace(topics.SENSOR_ASKED, depth=1000))
 _NAMED_S = 10.0
 """How long after an alarm its stage is waited for before the last seconds are kept."""
 _SILENT_S = 1.0
 # What is judged is learnt only once it is older than any change that is looked for.
 _LEARNING_S = BLOCK_S * float(LEARNT + WINDOWS[-1])
 _Array = NDArray[np.float64]
-
-
-@dataclass
-class _Stream:
-    """Joint states of fixed names that wait to be read."""
-
-    subscription: RawSubscription
-    names: Sequence[str]
-    columns: Callable[[JointStateSeries], Sequence[_Array]]  # what is read of them, each (N, J)
-    unreadable: int = 0  # messages without a number of theirs
-
-    def take(self) -> tuple[NDArray[np.int64], _Array]:
-        """Stamps (N,) in ns and values of what waits, as far as it is readable."""
-        data = [message for message, _ in self.subscription.take()]
-        size = np.array([len(each) for each in data], dtype=np.int64)
-        none = np.zeros(len(data), dtype=np.int64)
-        payloads = Payloads(b''.join(data), np.cumsum(size) - size, size)
-        try:
-            if data:
-                decoded = decode_joint_states(self.subscription.topic, payloads, none, none, none)
-                values = np.hstack(self.columns(decoded.select(self.names)))
-                # Somebody else's joints on this topic would have none of our numbers.
-                ours = np.isfinite(values).any(axis=1)
-                self.unreadable += int((~ours).sum())
-                return decoded.stamp_ns[ours], values[ours]
-        except BagError:
-            self.unreadable += len(data)
-        return none[:0], np.empty((0, 0))
 
 
 class WatchNode(EndoscopeNode):
@@ -84,7 +46,7 @@ class WatchNode(EndoscopeNode):
         super().__init__('watch', context)
         p = self.parameters(WatchParameters)
         self._active = p.active
-        self._streams: dict[str, _Stream] = {}
+        self._streams: dict[str, JointReadings] = {}
         self.diagnostics.add('rig', self._report)
         self.serve(names.WATCH_RESTART, self._restart)
         if not p.active:
@@ -104,18 +66,22 @@ class WatchNode(EndoscopeNode):
         # Compiled here rather than beside the ticks.
         self.rig_watch = _compiled(self._described)
         self._streams = {
-            'setpoint': self._stream(
+            'setpoint': JointReadings.of(
+                self,
                 names.MOTOR_SETPOINT, names.MOTORS, lambda s: [s.require('position')]
             ),
-            'motor': self._stream(
+            'motor': JointReadings.of(
+                self,
                 names.MOTOR_MEASURED,
                 names.MOTORS,
                 lambda s: [s.require('position'), _or_nan(s.effort, s.require('position'))],
             ),
-            'wires': self._stream(
+            'wires': JointReadings.of(
+                self,
                 names.WIRES_MEASURED, names.WIRES, lambda s: [s.require('effort')]
             ),
-            'tracker': self._stream(
+            'tracker': JointReadings.of(
+                self,
                 names.SLAVE_MEASURED, names.JOINTS, lambda s: [s.require('position')]
             ),
         }
@@ -124,14 +90,6 @@ class WatchNode(EndoscopeNode):
         self._beside = Beside(self.ticker)
         self._judging: Future[None] | None = None
         self.ticker.every(BLOCK_S, self._look)
-
-    def _stream(
-        self,
-        topic: str,
-        joints: Sequence[str],
-        columns: Callable[[JointStateSeries], Sequence[_Array]],
-    ) -> _Stream:
-        return _Stream(RawSubscription(self, JointState, topic, _ASKED), joints, columns)
 
     def extra_readers(self) -> list[tuple[str, int]]:
         """Topics that are read past the executor, and how many publishers each has found."""
@@ -170,13 +128,13 @@ class WatchNode(EndoscopeNode):
     def _begin(self) -> None:
         """Learn anew, with the plant in force."""
         plant, self._source = self._described, self._described_by
-        if self._adopted.plant:
-            try:
-                mapping = parse_yaml(self._adopted.plant, 'the adopted plant')
-                plant = plant_from_mapping(mapping)
-                self._source = f'adopted plant {self._adopted.hash}'
-            except FileError as error:
-                self.get_logger().error(f'goes on with the described plant: {error}')
+        try:
+            adopted = self._adopted.description()
+        except FileError as error:
+            self.get_logger().error(f'goes on with the described plant: {error}')
+        else:
+            if adopted is not None:
+                plant, self._source = adopted, f'adopted plant {self._adopted.hash}'
         for stream in self._streams.values():
             stream.subscription.take()
         self.rig_watch = RigWatch(plant)

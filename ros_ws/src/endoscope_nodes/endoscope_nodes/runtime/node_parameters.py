@@ -156,6 +156,14 @@ class WatchParameters:
 
 
 @dataclass(frozen=True)
+class TipForceParameters:
+    """Parameters of the force at the tip."""
+
+    active: bool = parameter(True,
+        'whether the force at the tip is worked out; off, the node subscribes to nothing')
+
+
+@dataclass(frozen=True)
 class RecorderParameters:
     """Parameters of the recorder."""
 
@@ -221,6 +229,7 @@ OF_NODE: dict[str, tuple[type, ...]] = {
     names.MASTER_NODE: (MasterParameters,),
     'instrument_model': (),
     'watch': (WatchParameters,),
+    'tip_force': (TipForceParameters,),
     'recorder': (RecorderParameters,),
     'replay': (ReplayParameters,),
     names.CLOCK_NODE: (SimulationClockParameters,),

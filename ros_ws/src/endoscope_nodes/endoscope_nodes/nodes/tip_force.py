@@ -1,0 +1,182 @@
+"""Publishes the force across the tip that wires, motors and tracker show by the plant in force."""
+
+import math
+from concurrent.futures import Future
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import WrenchStamped
+from threadpoolctl import threadpool_limits
+
+from endoscope_core.calibration.order_feedback import OrderState
+from endoscope_core.errors import FileError
+from endoscope_core.kinematics import Vertebrae
+from endoscope_core.physics import PlantDescription
+from endoscope_core.tip_force import State, TipForce, TipForceEstimator
+from endoscope_core.tip_force.estimator import BLOCK_S
+from endoscope_nodes import names
+from endoscope_nodes.client.order_feedback import feedback_of
+from endoscope_nodes.client.plant_adoption import PlantInForce
+from endoscope_nodes.runtime.beside import Beside
+from endoscope_nodes.runtime.diagnostics import OK, WARN, Report
+from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.joint_readings import JointReadings
+from endoscope_nodes.runtime.node_context import NodeContext
+from endoscope_nodes.runtime.node_parameters import TipForceParameters
+from endoscope_nodes.runtime.qos import RESULT, SENSOR_OFFERED
+
+_SECOND = 1_000_000_000
+_CALIBRATE = 'calibrate'
+
+
+class TipForceNode(EndoscopeNode):
+    """Works out what the tip touches, 40 times a second, in a thread of its own.
+
+    The plant is the one in force: the adopted one, or else the one described. Nothing touches the
+    tip while it calibrates: from that motion come the bounds, and before it there is no force.
+    """
+
+    def __init__(self, context: NodeContext) -> None:
+        super().__init__('tip_force', context)
+        self._active = self.parameters(TipForceParameters).active
+        self.diagnostics.add('force', self._report)
+        self._streams: dict[str, JointReadings] = {}
+        if not self._active:
+            return
+        instrument = self.rig.instrument
+        self._frame = Vertebrae(instrument.section_length, instrument.base_frame).tip_frame
+        self._plant = context.plant
+        self._adopted = PlantInForce()
+        self._free = self._wanted = False
+        self._origin_ns = 0
+        self._last: TipForce | None = None
+        self._published = 0
+        # Of small matrices: threads for each would stand in the way of the other nodes.
+        threadpool_limits(1, 'blas')
+        self.estimator = _compiled(self._plant, instrument.section_length)
+        self._streams = {
+            'motor': JointReadings.of(
+                self, names.MOTOR_MEASURED, names.MOTORS, lambda s: [s.require('position')]
+            ),
+            'wires': JointReadings.of(
+                self, names.WIRES_MEASURED, names.WIRES, lambda s: [s.require('effort')]
+            ),
+            'tracker': JointReadings.of(
+                self, names.SLAVE_MEASURED, names.JOINTS, lambda s: [s.require('position')]
+            ),
+        }
+        self._forces = self.create_publisher(WrenchStamped, names.TIP_FORCE, SENSOR_OFFERED)
+        self.create_subscription(DiagnosticArray, names.COMPENSATOR_PLANT, self._on_plant, RESULT)
+        self.create_subscription(
+            DiagnosticArray, names.CALIBRATION_FEEDBACK, self._on_feedback, RESULT
+        )
+        self._beside = Beside(self.ticker)
+        self._working: Future[list[TipForce]] | None = None
+        self.ticker.every(BLOCK_S, self._look)
+
+    def extra_readers(self) -> list[tuple[str, int]]:
+        """Topics that are read past the executor, and how many publishers each has found."""
+        heard = [stream.subscription for stream in self._streams.values()]
+        return [(each.topic, each.count_publishers()) for each in heard]
+
+    def _on_plant(self, message: DiagnosticArray) -> None:
+        reported = PlantInForce.of_message(message)
+        if reported is not None and reported.hash != self._adopted.hash:
+            self._adopted, self._wanted = reported, True
+
+    def _on_feedback(self, message: DiagnosticArray) -> None:
+        order = feedback_of(message)
+        self._free = order.order == _CALIBRATE and order.state == OrderState.EXECUTING
+
+    def _look(self) -> None:
+        """Publish what was worked out, and have what came since then worked out."""
+        if self._working is not None:
+            if not self._working.done():
+                return
+            for force in self._working.result():
+                self._publish(force)
+        if self._wanted:
+            self._wanted = False
+            self._begin()
+        self._working = self._beside.submit(self._work, self._free)
+
+    def _begin(self) -> None:
+        """Start anew with the plant in force."""
+        try:
+            plant = self._adopted.description() or self._plant
+        except FileError as error:
+            self.get_logger().error(f'continues with the plant before: {error}')
+            return
+        self.estimator = TipForceEstimator(plant, self.rig.instrument.section_length)
+        self._origin_ns, self._last = 0, None
+
+    def _work(self, free: bool) -> list[TipForce]:
+        taken = {name: stream.take() for name, stream in self._streams.items()}
+        stamps, _ = taken['motor']
+        if len(stamps) and not self._origin_ns:
+            self._origin_ns = int(stamps[0])
+        if not self._origin_ns:
+            return []
+        self.estimator.free = free
+        newest = 0.0
+        for name, (stamp_ns, values) in taken.items():
+            if len(stamp_ns):
+                seconds = (stamp_ns - self._origin_ns) * 1e-9
+                newest = max(newest, float(seconds[-1]))
+                getattr(self.estimator, name).append(seconds, values)
+        return self.estimator.update(newest)
+
+    def _publish(self, force: TipForce) -> None:
+        changed = self._last is None or self._last.seen != force.seen
+        self._last = force
+        message = WrenchStamped()
+        stamp_ns = self._origin_ns + round(force.time * _SECOND)
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, _SECOND)
+        message.header.frame_id = self._frame
+        message.wrench.force.x, message.wrench.force.y = force.force.tolist()
+        message.wrench.force.z = math.nan
+        self._forces.publish(message)
+        self._published += 1
+        if changed:
+            self.diagnostics.publish()
+
+    def _report(self) -> Report:
+        if not self._active:
+            return OK, 'off', {}
+        estimator, force = self.estimator, self._last
+        values: dict[str, object] = {
+            'plant': self._adopted.hash or 'as described',
+            'published': self._published,
+            'begun anew': estimator.restarts,
+            'because': estimator.restarted_because,
+        }
+        if estimator.state is not State.KNOWN or force is None:
+            return OK, f'no force: {estimator.state}', values
+        values |= {
+            'force [N]': force.size,
+            'at least [N]': force.at_least,
+            'at most [N]': force.at_most,
+            'visible [N]': force.visible,
+            'along the axis': 'cannot be seen',
+        }
+        if force.seen:
+            bounds = f'{force.at_least:.2g} to {force.at_most:.2g} N'
+            return WARN, f'the tip touches something: {force.size:.2g} N ({bounds})', values
+        return OK, f'nothing touches the tip with {force.visible:.2g} N or more', values
+
+    def close(self) -> None:
+        """Let the thread end, and leave the topics."""
+        if self._active:
+            self._beside.close()
+        for stream in self._streams.values():
+            stream.subscription.close()
+
+
+def _compiled(plant: PlantDescription, section_length: float) -> TipForceEstimator:
+    """An estimator, once all that it calls is compiled."""
+    estimator = TipForceEstimator(plant, section_length)
+    time = np.linspace(0.0, 0.5, 500)
+    for samples in (estimator.motor, estimator.wires, estimator.tracker):
+        samples.append(time, np.zeros((len(time), samples.columns)))
+    estimator.update(0.5)
+    return TipForceEstimator(plant, section_length)
