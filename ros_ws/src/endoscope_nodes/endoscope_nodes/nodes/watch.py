@@ -19,9 +19,9 @@ from endoscope_nodes.client.plant_adoption import PlantInForce
 from endoscope_nodes.runtime.beside import Beside
 from endoscope_nodes.runtime.diagnostics import OK, STALE, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.joint_readings import JointReadings
 from endoscope_nodes.runtime.node_context import NodeContext, load_slave
 from endoscope_nodes.runtime.node_parameters import WatchParameters
-from endoscope_nodes.runtime.joint_readings import JointReadings
 from endoscope_nodes.runtime.qos import EVENT, RESULT
 
 _SECOND = 1_000_000_000
@@ -67,8 +67,7 @@ class WatchNode(EndoscopeNode):
         self.rig_watch = _compiled(self._described)
         self._streams = {
             'setpoint': JointReadings.of(
-                self,
-                names.MOTOR_SETPOINT, names.MOTORS, lambda s: [s.require('position')]
+                self, names.MOTOR_SETPOINT, names.MOTORS, lambda s: [s.require('position')]
             ),
             'motor': JointReadings.of(
                 self,
@@ -77,12 +76,10 @@ class WatchNode(EndoscopeNode):
                 lambda s: [s.require('position'), _or_nan(s.effort, s.require('position'))],
             ),
             'wires': JointReadings.of(
-                self,
-                names.WIRES_MEASURED, names.WIRES, lambda s: [s.require('effort')]
+                self, names.WIRES_MEASURED, names.WIRES, lambda s: [s.require('effort')]
             ),
             'tracker': JointReadings.of(
-                self,
-                names.SLAVE_MEASURED, names.JOINTS, lambda s: [s.require('position')]
+                self, names.SLAVE_MEASURED, names.JOINTS, lambda s: [s.require('position')]
             ),
         }
         self._marks = self.create_publisher(String, names.RECORDER_MARK, EVENT)
