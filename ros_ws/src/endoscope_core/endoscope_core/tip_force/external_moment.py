@@ -31,7 +31,7 @@ TICK_S = 5e-3
 BLOCK_TICKS = 5
 LARGEST_MOMENT = 0.1
 """N m: forty times what the wires of the nominal rig can exert on the joint."""
-_ANGLE_PRECISION, _MOMENT_PRECISION = 1e-6, 1e-6  # rad, N m
+_ANGLE_PRECISION, _MOMENT_PRECISION = 1e-5, 1e-6  # rad, N m
 _FIRST_STEP, _GROWTH, _TRIES = 5e-5, 2.5, 60
 _MOMENT = LOAD.first_parameter
 _KEPT = 0.9
@@ -103,23 +103,26 @@ def _moment_for(
         low -= step
         step *= _GROWTH
         q_low = _bent(begin, *joint, low, out)
-    # The angle rises with the moment. Regula falsi, with every third step a bisection, as the slope
-    # changes by a hundred where friction has built up.
-    moment = 0.5 * (low + high)
-    for k in range(_TRIES):
+    if q_high < angle or q_low > angle:
+        return high if q_high < angle else low
+    # The angle rises with the moment: regula falsi as of Illinois (Dowell, Jarratt, BIT 11, 1971).
+    moment, side = first, 0
+    under, over = q_low - angle, q_high - angle
+    for _ in range(_TRIES):
         if high - low < _MOMENT_PRECISION:
             break
-        share = 0.5
-        if q_high > q_low and k % 3 != 2:
-            share = min(0.95, max(0.05, (angle - q_low) / (q_high - q_low)))
-        moment = low + share * (high - low)
-        q = _bent(begin, *joint, moment, out)
-        if abs(q - angle) < _ANGLE_PRECISION:
+        moment = (low * over - high * under) / (over - under)
+        off = _bent(begin, *joint, moment, out) - angle
+        if abs(off) < _ANGLE_PRECISION:
             break
-        if q < angle:
-            low, q_low = moment, q
+        if off < 0.0:
+            low, under = moment, off
+            over *= 0.5 if side < 0 else 1.0
+            side = -1
         else:
-            high, q_high = moment, q
+            high, over = moment, off
+            under *= 0.5 if side > 0 else 1.0
+            side = 1
     return moment
 
 
@@ -167,11 +170,10 @@ class ExternalMoment:
         """Moments under which the joint follows a block."""
         by_angle, by_plant = self._angle_led.follow(block), self._plant_led.follow(block)
         free = by_plant.low <= 0.0 <= by_plant.high
-        return MomentSet(
-            min(by_angle.low, by_plant.low),
-            by_plant.likely if free else by_angle.likely,
-            max(by_angle.high, by_plant.high),
-        )
+        likely = by_plant.likely if free else self._angle_led.moment_for(block.angle, block)
+        self._angle_led.go_on(block)
+        self._plant_led.go_on(block)
+        return MomentSet(min(by_angle.low, by_plant.low), likely, max(by_angle.high, by_plant.high))
 
 
 class _Follower:
@@ -189,32 +191,38 @@ class _Follower:
         self._inputs, self._out = np.zeros(layout.INPUTS), np.empty(layout.OUTPUTS)
         self._rest = (history[0], sheath[0], p[0], flags[0], self._inputs)
         self._stiffness = p[0, layout.WIRE_STIFFNESS]
-        self._path, self._angle, self._moment = path, float(x[0, layout.TIP]), 0.0
+        self._path, self._angle = path, float(x[0, layout.TIP])
+        self._moment = self._next = 0.0
 
     def follow(self, block: Block) -> MomentSet:
-        """Moments under which this copy follows a block."""
+        """Moments under which this copy follows a block, and the one under which it will go on."""
         self._begin[:] = self._x
         self._inputs[layout.IN_OTHER_JOINT] = block.other
         lowest, highest = block.angle - block.half_width, block.angle + block.half_width
-        low = self._moment_for(lowest, block, self._moment)
-        high = self._moment_for(highest, block, low)
-        if self._path is Path.ANGLE:
-            likely = self._moment_for(block.angle, block, self._moment)
-            self._angle = min(max(self._angle, lowest), highest)
-            self._moment = self._moment_for(self._angle, block, self._moment)
-        else:
+        low = self.moment_for(lowest, block, self._moment)
+        high = self.moment_for(highest, block, max(low, self._moment))
+        if self._path is Path.PLANT:
             wanted = self._moment * (_KEPT if low <= 0.0 <= high else 1.0)
-            likely = min(max(wanted, low), high)
-            _bent(
-                *(self._begin, self._x, *self._rest, block.shaft),
-                *(self._moment, likely, self._out),
-            )
-            self._moment = likely
+            self._next = min(max(wanted, low), high)
+        elif self._angle <= lowest or self._angle >= highest:
+            self._next = low if self._angle <= lowest else high
+            self._angle = lowest if self._angle <= lowest else highest
+        else:
+            share = (self._angle - lowest) / (highest - lowest)
+            self._next = self.moment_for(self._angle, block, low + share * (high - low))
+        return MomentSet(low, self._next, high)
+
+    def go_on(self, block: Block) -> None:
+        """Go through the block that was followed."""
+        joint = (self._begin, self._x, *self._rest, block.shaft)
+        _bent(*joint, self._moment, self._next, self._out)
+        self._moment = self._next
         wires = self._out[[layout.OUT_TENSION_A, layout.OUT_TENSION_B]]
         more = _RETENSIONED * np.nan_to_num(block.tension - wires)
         self._x[layout.TRAVEL : layout.TRAVEL + 2] -= more / self._stiffness
-        return MomentSet(low, likely, high)
 
-    def _moment_for(self, angle: float, block: Block, first: float) -> float:
+    def moment_for(self, angle: float, block: Block, first: float | None = None) -> float:
+        """The moment in N m that bends the joint to an angle in rad in a block."""
         joint = (self._begin, self._x, *self._rest, block.shaft, self._out)
-        return _moment_for(angle, self._moment, first, *joint)
+        near = self._next if first is None else first
+        return _moment_for(angle, self._moment, near, *joint)
