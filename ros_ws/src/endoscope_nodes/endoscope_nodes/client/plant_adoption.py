@@ -11,10 +11,7 @@ from rclpy.serialization import deserialize_message
 
 from endoscope_core.calibration.order_feedback import OrderState
 from endoscope_core.errors import FileError
-from endoscope_core.physics import PlantDescription
-from endoscope_core.physics.plant_file import plant_from_mapping
 from endoscope_core.safety import AdoptionCode, BendingRange
-from endoscope_core.schema import parse_yaml
 from endoscope_nodes import names
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import PATIENCE_S, GraphError
@@ -93,12 +90,6 @@ class PlantInForce:
     def ranges(self) -> tuple[BendingRange, ...]:
         """How far each of J joints may be bent in rad; empty where that is not known."""
         return () if self.reach is None else (self.reach.bend_x, self.reach.bend_y)
-
-    def description(self) -> PlantDescription | None:
-        """The adopted plant; None where there is none. FileError for a text that is no plant."""
-        if not self.plant:
-            return None
-        return plant_from_mapping(parse_yaml(self.plant, 'the adopted plant'))
 
     def message(self, stamp_ns: int, session: str) -> DiagnosticArray:
         """Write it, at a time in ns, of a motion session."""

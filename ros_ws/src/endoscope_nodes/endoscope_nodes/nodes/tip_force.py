@@ -21,7 +21,7 @@ from endoscope_nodes.runtime.beside import Beside
 from endoscope_nodes.runtime.diagnostics import OK, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.joint_readings import JointReadings
-from endoscope_nodes.runtime.node_context import NodeContext
+from endoscope_nodes.runtime.node_context import NodeContext, adopted_plant
 from endoscope_nodes.runtime.node_parameters import TipForceParameters
 from endoscope_nodes.runtime.qos import RESULT, SENSOR_OFFERED
 
@@ -103,7 +103,7 @@ class TipForceNode(EndoscopeNode):
     def _begin(self) -> None:
         """Start anew with the plant in force."""
         try:
-            plant = self._adopted.description() or self._plant
+            plant = adopted_plant(self._adopted.plant) or self._plant
         except FileError as error:
             self.get_logger().error(f'continues with the plant before: {error}')
             return

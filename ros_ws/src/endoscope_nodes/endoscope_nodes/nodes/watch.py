@@ -20,7 +20,7 @@ from endoscope_nodes.runtime.beside import Beside
 from endoscope_nodes.runtime.diagnostics import OK, STALE, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.joint_readings import JointReadings
-from endoscope_nodes.runtime.node_context import NodeContext, load_slave
+from endoscope_nodes.runtime.node_context import NodeContext, adopted_plant, load_slave
 from endoscope_nodes.runtime.node_parameters import WatchParameters
 from endoscope_nodes.runtime.qos import EVENT, RESULT
 
@@ -126,7 +126,7 @@ class WatchNode(EndoscopeNode):
         """Learn anew, with the plant in force."""
         plant, self._source = self._described, self._described_by
         try:
-            adopted = self._adopted.description()
+            adopted = adopted_plant(self._adopted.plant)
         except FileError as error:
             self.get_logger().error(f'goes on with the described plant: {error}')
         else:

@@ -13,7 +13,9 @@ from endoscope_core.errors import FileError
 from endoscope_core.physics import PlantDescription, load_plant
 from endoscope_core.physics.effect import Stage
 from endoscope_core.physics.effects import describe
+from endoscope_core.physics.plant_file import plant_from_mapping
 from endoscope_core.rig import Rig, load_rig
+from endoscope_core.schema import parse_yaml
 from endoscope_nodes.names import CLOCK, CLOCK_NODE, JOINTS
 from endoscope_nodes.runtime.declared_parameters import (
     check_sections,
@@ -27,6 +29,11 @@ from endoscope_nodes.runtime.parameters import ParameterError, changed
 from endoscope_nodes.runtime.ticker import Ticker
 
 NAMESPACE = 'endoscope'
+
+
+def adopted_plant(text: str) -> PlantDescription | None:
+    """Read a plant that a compensator has in force; None for no text, FileError for no plant."""
+    return plant_from_mapping(parse_yaml(text, 'the adopted plant')) if text else None
 
 
 def load_slave(source: str, path: str) -> PlantDescription:
