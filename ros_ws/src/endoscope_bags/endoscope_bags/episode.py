@@ -172,10 +172,13 @@ def _forces(bag: Recording, topic: str) -> tuple[tuple[str, ...], IntArray, Floa
     ]
     stamps = np.array([stamp for stamp, _ in rows], dtype=np.int64)
     values = np.array([(f.x, f.y, f.z) for _, f in rows], dtype=np.float64)
-    if not np.isfinite(values).all():
+    # A component that is never a number was not measured, as the one along the tip's axis.
+    known = np.flatnonzero(~np.isnan(values).all(axis=0))
+    values = values[:, known]
+    if not (len(known) and np.isfinite(values).all()):
         raise BagError(f'{bag.path}: topic {topic} has forces that are not finite')
     order = np.argsort(stamps, kind='stable')
-    return ('force_x', 'force_y', 'force_z'), stamps[order], values[order]
+    return tuple(f'force_{"xyz"[k]}' for k in known), stamps[order], values[order]
 
 
 def episodes_of(recorded: Channels, fps: int) -> list[Episode]:

@@ -29,13 +29,13 @@ def joint_states(topic, names, stamp_ns, quantity='position', scale=1.0):
     return MessageStream(f'/rig/{topic}', JOINT_STATE, payloads, stamp_ns)
 
 
-def forces(stamp_ns):
+def forces(stamp_ns, along=-2.0):
     types = typestore().types
     header, time = types['std_msgs/msg/Header'], types['builtin_interfaces/msg/Time']
     vector, wrench = types['geometry_msgs/msg/Vector3'], types['geometry_msgs/msg/Wrench']
     payloads = []
     for stamp in stamp_ns.tolist():
-        force = vector(x=1e-9 * (stamp - START), y=0.5, z=-2.0)
+        force = vector(x=1e-9 * (stamp - START), y=0.5, z=along)
         message = types[WRENCH_STAMPED](
             header=header(stamp=time(sec=stamp // 10**9, nanosec=stamp % 10**9), frame_id='body'),
             wrench=wrench(force=force, torque=vector(x=0.0, y=0.0, z=0.0)),
@@ -74,6 +74,20 @@ def test_a_command_holds_and_what_was_measured_goes_on(recorded):
         assert values == pytest.approx(scale * np.stack([time, time + 1.0], 1), abs=1e-6)
     force = episode.values['observation.meta.tip_force']
     assert force == pytest.approx(np.stack([time, 0 * time + 0.5, 0 * time - 2.0], 1), abs=1e-6)
+
+
+def test_a_component_of_the_force_that_is_never_known_is_left_out(tmp_path):
+    streams = (
+        joint_states('slave/servo_jp', JOINTS, stamps(4.0)),
+        joint_states('slave/measured_js', JOINTS, stamps(40.0)),
+    )
+    recorded = written(tmp_path / 'a.mcap', *streams, forces(stamps(40.0), along=np.nan))
+    [episode] = episodes_of(recorded, 40)
+    [channel] = [c for c in recorded.channels if c.source.quantity == 'force']
+    assert channel.names == ('force_x', 'force_y')
+    assert episode.values['observation.meta.tip_force'][:, 1] == pytest.approx(0.5)
+    with pytest.raises(BagError, match='forces that are not finite'):
+        written(tmp_path / 'b.mcap', *streams, forces(stamps(40.0), along=np.inf))
 
 
 def test_frames_on_the_stamps_of_the_tracker_are_its_readings(recorded):
