@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from endoscope_core.kinematics.constant_curvature import Vector
+from endoscope_core.kinematics.constant_curvature import Vector, tip_lever
 
 _SMALL = 1e-6
 
@@ -49,8 +49,7 @@ def bending_rate(
         raise ValueError(f'a bending of {angle:.4g} rad is half a turn or more')
     turn_x, turn_y = velocity.angular[1], -velocity.angular[0]
     if not (turn_x or turn_y):
-        half = 0.5 * angle
-        lever = 0.5 * length * (math.sin(half) / half if half > _SMALL else 1.0) ** 2
+        lever = tip_lever(bending, length)
         return velocity.linear[0] / lever, velocity.linear[1] / lever
     if angle < _SMALL:
         return turn_x, turn_y

@@ -1,6 +1,7 @@
 """The force across the tip, with bounds, while the instrument moves."""
 
 import math
+from bisect import insort
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -112,7 +113,7 @@ class _Joint:
         self.observer, self.delay_s = observer, delay_s
         self._way, self._low, self._high = 0.0, math.inf, -math.inf
         self._shaft = math.nan
-        self.free: list[float] = []  # misfit of each block, N m
+        self.free: list[float] = []  # misfits of the blocks, rising, N m
         self.bound = self.least_seen = math.nan  # N m
 
     @property
@@ -133,16 +134,16 @@ class _Joint:
     def learn(self, moments: MomentSet) -> None:
         """Add a block of free motion to those that the bounds are from."""
         # By how much zero is outside of the set; negative within it.
-        self.free.append(max(moments.low, -moments.high))
+        insort(self.free, max(moments.low, -moments.high))
         if len(self.free) < LEAST_FREE:
             return
-        self.bound = max(0.0, float(np.quantile(self.free, COVERED)))
+        self.bound = max(0.0, self.free[round(COVERED * len(self.free))])
         # What exceeds a high level does so by an exponentially distributed amount (Pickands,
         # Ann. Statist. 3(1), 1975, of a light tail).
-        level = float(np.quantile(self.free, 1.0 - TAIL))
-        beyond = [misfit - level for misfit in self.free if misfit > level]
-        rarity = math.log(len(beyond) / len(self.free) * FALSE_ALARM_S / BLOCK_S)
-        self.least_seen = max(self.bound, level + float(np.mean(beyond)) * rarity)
+        begin = round((1.0 - TAIL) * len(self.free))
+        level, tail = self.free[begin - 1], self.free[begin:]
+        rarity = math.log(TAIL * FALSE_ALARM_S / BLOCK_S)
+        self.least_seen = max(self.bound, level + (sum(tail) / len(tail) - level) * rarity)
 
 
 class TipForceEstimator:

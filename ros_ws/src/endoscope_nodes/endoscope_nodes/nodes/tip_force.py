@@ -6,6 +6,7 @@ from concurrent.futures import Future
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
+from rclpy.time import Time
 from threadpoolctl import threadpool_limits
 
 from endoscope_core.calibration.order_feedback import OrderState
@@ -20,7 +21,7 @@ from endoscope_nodes.client.plant_adoption import PlantInForce
 from endoscope_nodes.runtime.beside import Beside
 from endoscope_nodes.runtime.diagnostics import OK, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
-from endoscope_nodes.runtime.joint_readings import JointReadings
+from endoscope_nodes.runtime.joint_readings import JointReadings, RigReadings
 from endoscope_nodes.runtime.node_context import NodeContext, adopted_plant
 from endoscope_nodes.runtime.node_parameters import TipForceParameters
 from endoscope_nodes.runtime.qos import RESULT, SENSOR_OFFERED
@@ -40,7 +41,7 @@ class TipForceNode(EndoscopeNode):
         super().__init__('tip_force', context)
         self._active = self.parameters(TipForceParameters).active
         self.diagnostics.add('force', self._report)
-        self._streams: dict[str, JointReadings] = {}
+        self._readings = RigReadings()
         if not self._active:
             return
         instrument = self.rig.instrument
@@ -48,13 +49,12 @@ class TipForceNode(EndoscopeNode):
         self._plant = context.plant
         self._adopted = PlantInForce()
         self._free = self._wanted = False
-        self._origin_ns = 0
         self._last: TipForce | None = None
         self._published = 0
         # Of small matrices: threads for each would stand in the way of the other nodes.
         threadpool_limits(1, 'blas')
         self.estimator = _compiled(self._plant, instrument.section_length)
-        self._streams = {
+        self._readings.streams = {
             'motor': JointReadings.of(
                 self, names.MOTOR_MEASURED, names.MOTORS, lambda s: [s.require('position')]
             ),
@@ -76,8 +76,7 @@ class TipForceNode(EndoscopeNode):
 
     def extra_readers(self) -> list[tuple[str, int]]:
         """Topics that are read past the executor, and how many publishers each has found."""
-        heard = [stream.subscription for stream in self._streams.values()]
-        return [(each.topic, each.count_publishers()) for each in heard]
+        return self._readings.heard()
 
     def _on_plant(self, message: DiagnosticArray) -> None:
         reported = PlantInForce.of_message(message)
@@ -108,30 +107,20 @@ class TipForceNode(EndoscopeNode):
             self.get_logger().error(f'continues with the plant before: {error}')
             return
         self.estimator = TipForceEstimator(plant, self.rig.instrument.section_length)
-        self._origin_ns, self._last = 0, None
+        self._readings.forget()
+        self._last = None
 
     def _work(self, free: bool) -> list[TipForce]:
-        taken = {name: stream.take() for name, stream in self._streams.items()}
-        stamps, _ = taken['motor']
-        if len(stamps) and not self._origin_ns:
-            self._origin_ns = int(stamps[0])
-        if not self._origin_ns:
-            return []
         self.estimator.free = free
-        newest = 0.0
-        for name, (stamp_ns, values) in taken.items():
-            if len(stamp_ns):
-                seconds = (stamp_ns - self._origin_ns) * 1e-9
-                newest = max(newest, float(seconds[-1]))
-                getattr(self.estimator, name).append(seconds, values)
-        return self.estimator.update(newest)
+        newest = self._readings.pass_on(self.estimator)
+        return self.estimator.update(max(newest.values())) if newest else []
 
     def _publish(self, force: TipForce) -> None:
         changed = self._last is None or self._last.seen != force.seen
         self._last = force
         message = WrenchStamped()
-        stamp_ns = self._origin_ns + round(force.time * _SECOND)
-        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, _SECOND)
+        stamp_ns = self._readings.origin_ns + round(force.time * _SECOND)
+        message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
         message.header.frame_id = self._frame
         message.wrench.force.x, message.wrench.force.y = force.force.tolist()
         message.wrench.force.z = math.nan
@@ -168,8 +157,7 @@ class TipForceNode(EndoscopeNode):
         """Let the thread end, and leave the topics."""
         if self._active:
             self._beside.close()
-        for stream in self._streams.values():
-            stream.subscription.close()
+        self._readings.close()
 
 
 def _compiled(plant: PlantDescription, section_length: float) -> TipForceEstimator:

@@ -19,7 +19,7 @@ from endoscope_nodes.client.plant_adoption import PlantInForce
 from endoscope_nodes.runtime.beside import Beside
 from endoscope_nodes.runtime.diagnostics import OK, STALE, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
-from endoscope_nodes.runtime.joint_readings import JointReadings
+from endoscope_nodes.runtime.joint_readings import JointReadings, RigReadings
 from endoscope_nodes.runtime.node_context import NodeContext, adopted_plant, load_slave
 from endoscope_nodes.runtime.node_parameters import WatchParameters
 from endoscope_nodes.runtime.qos import EVENT, RESULT
@@ -46,7 +46,7 @@ class WatchNode(EndoscopeNode):
         super().__init__('watch', context)
         p = self.parameters(WatchParameters)
         self._active = p.active
-        self._streams: dict[str, JointReadings] = {}
+        self._readings = RigReadings()
         self.diagnostics.add('rig', self._report)
         self.serve(names.WATCH_RESTART, self._restart)
         if not p.active:
@@ -56,7 +56,6 @@ class WatchNode(EndoscopeNode):
         self._source = self._described_by = p.plant or context.plant_name
         self._adopted = PlantInForce()
         self._wanted = True
-        self._origin_ns = 0
         self._newest_s = 0.0
         self._heard_ns = self.ticker.monotonic_ns()
         self._alarms: dict[str, DetectedChange] = {}
@@ -65,7 +64,7 @@ class WatchNode(EndoscopeNode):
         threadpool_limits(1, 'blas')
         # Compiled here rather than beside the ticks.
         self.rig_watch = _compiled(self._described)
-        self._streams = {
+        self._readings.streams = {
             'setpoint': JointReadings.of(
                 self, names.MOTOR_SETPOINT, names.MOTORS, lambda s: [s.require('position')]
             ),
@@ -90,8 +89,7 @@ class WatchNode(EndoscopeNode):
 
     def extra_readers(self) -> list[tuple[str, int]]:
         """Topics that are read past the executor, and how many publishers each has found."""
-        heard = [stream.subscription for stream in self._streams.values()]
-        return [(each.topic, each.count_publishers()) for each in heard]
+        return self._readings.heard()
 
     @property
     def announcement(self) -> str:
@@ -132,25 +130,14 @@ class WatchNode(EndoscopeNode):
         else:
             if adopted is not None:
                 plant, self._source = adopted, f'adopted plant {self._adopted.hash}'
-        for stream in self._streams.values():
-            stream.subscription.take()
+        self._readings.forget()
         self.rig_watch = RigWatch(plant)
-        self._origin_ns = 0
 
     def _judge(self) -> None:
-        taken = {name: stream.take() for name, stream in self._streams.items()}
-        stamps, _ = taken['motor']
-        if len(stamps) and not self._origin_ns:
-            self._origin_ns = int(stamps[0])
-        if not self._origin_ns:
-            return
-        for name, (stamp_ns, values) in taken.items():
-            if len(stamp_ns):
-                seconds = (stamp_ns - self._origin_ns) * 1e-9
-                getattr(self.rig_watch, name).append(seconds, values)
-        if len(stamps):
+        newest = self._readings.pass_on(self.rig_watch)
+        if 'motor' in newest:
             self._heard_ns = self.ticker.monotonic_ns()
-            self._newest_s = float(stamps[-1] - self._origin_ns) * 1e-9
+            self._newest_s = newest['motor']
             self.rig_watch.update(self._newest_s)
 
     def _tell(self) -> None:
@@ -172,7 +159,9 @@ class WatchNode(EndoscopeNode):
         return f'{alarm}, since {self._utc(alarm.since)}, margin {alarm.margin:.1f}'
 
     def _utc(self, seconds: float) -> str:
-        return f'{datetime.fromtimestamp(seconds + self._origin_ns * 1e-9, UTC):%H:%M:%S} UTC'
+        return (
+            f'{datetime.fromtimestamp(seconds + self._readings.origin_ns * 1e-9, UTC):%H:%M:%S} UTC'
+        )
 
     def _report(self) -> Report:
         if not self._active:
@@ -187,7 +176,7 @@ class WatchNode(EndoscopeNode):
         }
         for joint in watch.joints:
             values[f'{joint.name} learnt [s]'] = BLOCK_S * min(joint.test.learnt, LEARNT)
-        for name, stream in self._streams.items():
+        for name, stream in self._readings.streams.items():
             values[f'{name} unreadable'] = stream.unreadable
         for alarm in self._alarms.values():
             values |= {
@@ -211,8 +200,7 @@ class WatchNode(EndoscopeNode):
         """Let the thread end, and leave the topics."""
         if self._active:
             self._beside.close()
-        for stream in self._streams.values():
-            stream.subscription.close()
+        self._readings.close()
 
 
 def _or_nan(values: _Array | None, like: _Array) -> _Array:

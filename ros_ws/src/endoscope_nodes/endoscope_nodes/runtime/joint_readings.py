@@ -58,3 +58,46 @@ class JointReadings:
         except BagError:
             self.unreadable += len(data)
         return none[:0], np.empty((0, 0))
+
+
+class RigReadings:
+    """All that a node follows of the rig, by the names of the samples that they become."""
+
+    def __init__(self) -> None:
+        self.streams: dict[str, JointReadings] = {}
+        self.origin_ns = 0  # first stamp of the motors, from which seconds count
+
+    def heard(self) -> list[tuple[str, int]]:
+        """Topics that are read past the executor, and how many publishers each has found."""
+        heard = [stream.subscription for stream in self.streams.values()]
+        return [(each.topic, each.count_publishers()) for each in heard]
+
+    def pass_on(self, model: object) -> dict[str, float]:
+        """Append what waits to the samples of a model; newest of each stream that said something.
+
+        In s since the motors began to.
+        """
+        taken = {name: stream.take() for name, stream in self.streams.items()}
+        stamps, _ = taken['motor']
+        if len(stamps) and not self.origin_ns:
+            self.origin_ns = int(stamps[0])
+        if not self.origin_ns:
+            return {}
+        newest = {}
+        for name, (stamp_ns, values) in taken.items():
+            if len(stamp_ns):
+                seconds = (stamp_ns - self.origin_ns) * 1e-9
+                newest[name] = float(seconds[-1])
+                getattr(model, name).append(seconds, values)
+        return newest
+
+    def forget(self) -> None:
+        """Drop what waits, and count seconds from what comes."""
+        for stream in self.streams.values():
+            stream.subscription.take()
+        self.origin_ns = 0
+
+    def close(self) -> None:
+        """Leave the topics."""
+        for stream in self.streams.values():
+            stream.subscription.close()
