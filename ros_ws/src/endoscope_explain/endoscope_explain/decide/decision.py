@@ -127,11 +127,10 @@ def _missing(level: Level, best: Candidate, jobs: int) -> MissingTerm:
     formula = best if not last.is_function else (formulas[0] if formulas else None)
     name = _name(level, best)
     gain = level.gain(best)
-    beside = [t.id for t in best.terms[:-1]]
     others = [
         each
-        for each in level.found
-        if each.terms and [t.id for t in each.terms[:-1]] == beside and _name(level, each) != name
+        for more, each in level.beside(best.terms[:-1])
+        if (_name(level, each) if more is each.terms[-1] else more.id) != name
     ]
     best_other = max((level.gain(each) for each in others), default=0.0)
     if formula is not None and formula is not best:
@@ -184,17 +183,19 @@ def _contest(
 
     `first` is the name that was chosen, with the candidate that has it; None where none was.
     """
-    beside = [term.id for term in terms]
+    beside = level.beside(terms)
     tried: dict[str, Candidate] = {}
-    if first is not None and first[1].terms[-1].is_function and not _has(level, beside, first[0]):
+    formulas = {more.id for more, _ in beside}
+    if first is not None and first[1].terms[-1].is_function and first[0] not in formulas:
         # The effect whose function it is, of which no formula was fitted.
         tried[first[0]] = first[1]
+    there = [term.id for term in terms]
     for each in level.found:
-        ids = [term.id for term in each.terms]
-        if ids == beside and level.adds_nothing(each):
+        if [term.id for term in each.terms] == there and level.adds_nothing(each):
             tried.setdefault(OTHER_NUMBERS, each)
-        elif ids[:-1] == beside and not each.terms[-1].multiplies:
-            tried.setdefault(ids[-1], each)
+    for more, each in beside:
+        if not more.multiplies:
+            tried.setdefault(more.id, each)
     entries: list[tuple[list[str], Candidate]] = []
     for name, each in sorted(tried.items(), key=lambda item: -item[1].evidence):
         same = next((names for names, other in entries if are_one(each, other, level.parent)), None)
@@ -208,10 +209,6 @@ def _contest(
         level.judge.form_is_worth,
         level.is_found and first is not None,
     )
-
-
-def _has(level: Level, beside: list[str], name: str) -> bool:
-    return any([term.id for term in each.terms] == [*beside, name] for each in level.found)
 
 
 def are_one(one: Candidate, other: Candidate, parent: Candidate) -> bool:

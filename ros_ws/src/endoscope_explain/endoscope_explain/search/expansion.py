@@ -64,6 +64,7 @@ class Screened:
     behind: tuple[Background, ...]
     ways: tuple[tuple[Directions, ...], ...]
     known: Collection[str] = ()  # terms that were named, or left open, by other recordings
+    left_out: tuple[str, ...] = ()  # effects that are not searched for
 
 
 def screen_terms(
@@ -73,7 +74,7 @@ def screen_terms(
     behind = tuple(background(found) for found in parent.candidate.fits)
     terms = _terms(behind, left_out)
     ways = tuple(directions(b, own, jobs) for b, own in zip(behind, terms, strict=True))
-    return Screened(parent, behind, _of_one_size(ways), known)
+    return Screened(parent, behind, _of_one_size(ways), known, left_out)
 
 
 def _terms(behind: Sequence[Background], left_out: tuple[str, ...]) -> list[tuple[Term, ...]]:

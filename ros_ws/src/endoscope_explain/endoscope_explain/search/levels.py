@@ -15,6 +15,7 @@ from itertools import takewhile
 
 from endoscope_core.physics.effects import lacking
 from endoscope_core.workers import parallel_map
+from endoscope_explain.fit.evidence import predicts_worse
 from endoscope_explain.fit.model import Fit
 from endoscope_explain.fit.nominal import is_at_tolerance, with_any_numbers
 from endoscope_explain.options import MOST_EFFECTS
@@ -38,12 +39,14 @@ from endoscope_explain.search.null_rigs import (
     null_of_several,
     null_rigs,
 )
+from endoscope_explain.search.pairs import better_pair
 from endoscope_explain.search.refit import (
     Candidate,
     by_fine_derivatives,
     candidate,
     converged,
 )
+from endoscope_explain.search.term import Term
 
 MOST_FITS, WORTH_A_FIT = 6, 1.0
 """Fits of what every rig has, without which all other numbers were bent, and the gain of evidence
@@ -63,6 +66,8 @@ class Level:
     judge: Judge = NOT_JUDGED
     # Candidates that explain what they were fitted to, and do not foretell what they were not.
     not_foretelling: tuple[Candidate, ...] = ()
+    # One more that was added to, with a term that no level before has fitted.
+    instead: Candidate | None = None
 
     def gain(self, one: Candidate) -> float:
         """Logarithm of the evidence of a candidate over its parent's."""
@@ -100,6 +105,12 @@ class Level:
             and {term.id for term in each.terms[:-1]} == rest
             and each.terms[-1].shares_place(one.terms[-1])
         )
+
+    def beside(self, terms: Iterable[Term]) -> list[tuple[Term, Candidate]]:
+        """Candidates that have some terms and one more, and which one that is."""
+        there = sorted(term.id for term in terms)
+        found = ((_one_more(each, there), each) for each in self.found)
+        return [(more, each) for more, each in found if more is not None]
 
     @property
     def p_value(self) -> float:
@@ -170,9 +181,16 @@ def search(
     beside = zip(nominal.fits, recordings, strict=True)
     parents = [Parent(nominal, tuple((found, *described) for found, (_, *described) in beside))]
     levels: list[Level] = []
+    first: Screened | None = None  # of the last candidate that has only what every rig has
     while len(parents[0].candidate.terms) < depth and not parents[0].candidate.is_noise:
         changed = any(each.adds_nothing(each.best) for each in levels)
-        level = _level(parents, jobs, left_out, known, other_numbers=not changed)
+        screens = [screen_terms(parent, jobs, left_out, known) for parent in parents]
+        if all(term.is_in_every_rig for term in parents[0].candidate.terms):
+            first = screens[0]
+        level = _level(screens, first, jobs, other_numbers=not changed)
+        if level.instead is not None:
+            before = levels[-1]
+            levels[-1] = replace(before, found=_ranked([*before.found, level.instead]))
         levels.append(level)
         report(f'{joint}: {_in_words(level)}')
         if not level.is_found:
@@ -199,6 +217,15 @@ def _names(one: Candidate) -> str:
     return ', '.join(term.id for term in one.terms)
 
 
+def _one_more(one: Candidate, there: list[str]) -> Term | None:
+    """The term that a candidate has beside some, by their sorted ids; None where it has others."""
+    # The last one, unless terms came in another order.
+    for k in reversed(range(len(one.terms))):
+        if sorted(term.id for term in one.terms[:k] + one.terms[k + 1 :]) == there:
+            return one.terms[k]
+    return None
+
+
 def _in_words(level: Level) -> str:
     """What came of a level, in words."""
     if not level.found:
@@ -222,28 +249,43 @@ def _from_afar(one: Candidate) -> Candidate:
 
 
 def _level(
-    parents: Sequence[Parent],
-    jobs: int,
-    left_out: tuple[str, ...],
-    known: Collection[str],
-    *,
-    other_numbers: bool,
+    screens: Sequence[Screened], base: Screened | None, jobs: int, *, other_numbers: bool
 ) -> Level:
-    first = parents[0].candidate
-    screens = [screen_terms(parent, jobs, left_out, known) for parent in parents]
+    """Candidates with one term more than those that were screened.
+
+    `base` is the screen of the last candidate that has no more than every rig has.
+    """
+    parents = [screen.parent.candidate for screen in screens]
     found = [each for screen in screens for each in expanded(screen, jobs)]
     found += [
-        converged(candidate(parent.candidate.terms, *map(with_any_numbers, parent.candidate.fits)))
+        converged(candidate(parent.terms, *map(with_any_numbers, parent.fits)))
         for parent in parents
-        if other_numbers and any(map(is_at_tolerance, parent.candidate.fits))
+        if other_numbers and any(map(is_at_tolerance, parent.fits))
     ]
-    level = _judged(first, found, screens[0], jobs)
-    if level.is_found or (level.found and level.found[0].is_noise):
-        return level
-    more = before_giving_up(screens[0], found, jobs)
-    if all(each.evidence < level.found[0].evidence for each in more):
-        return replace(level, found=_ranked([*level.found, *more]))
-    return _judged(first, [*found, *more], screens[0], jobs)
+    more = _instead(parents[0], base, found, jobs)
+    if more is not None:
+        found += expanded(more, jobs)
+    level = _judged(parents[0], found, screens[0], jobs)
+    if not (level.is_found or (level.found and level.found[0].is_noise)):
+        others = before_giving_up(screens[0], found, jobs)
+        if all(each.evidence < level.found[0].evidence for each in others):
+            level = replace(level, found=_ranked([*level.found, *others]))
+        else:
+            level = _judged(parents[0], [*found, *others], screens[0], jobs)
+    return level if more is None else replace(level, instead=more.parent.candidate)
+
+
+def _instead(
+    parent: Candidate, base: Screened | None, found: Sequence[Candidate], jobs: int
+) -> Screened | None:
+    """The screen of another first term, where a pair of the screen's has more evidence."""
+    if base is None or len(parent.fits) > 1:
+        return None
+    if len(parent.terms) != len(base.parent.candidate.terms) + 1:
+        return None
+    pairs = [c for c in found if len(c.terms) > len(parent.terms)]
+    other = better_pair(base, pairs, jobs)
+    return None if other is None else screen_terms(other, jobs, base.left_out, base.known)
 
 
 def _judged(first: Candidate, found: list[Candidate], screen: Screened, jobs: int) -> Level:
@@ -295,7 +337,13 @@ def _may_stand(one: Candidate, first: Candidate) -> bool:
 
 
 def _foretells(one: Candidate, first: Candidate) -> bool:
-    return one.unseen_misfit < first.unseen_misfit
+    """Whether a candidate predicts better what it has not seen, and no signal worse."""
+    if one.unseen_misfit >= first.unseen_misfit:
+        return False
+    return not any(
+        predicts_worse(fit.model.observation, before, after)
+        for fit, before, after in zip(one.fits, first.unseen, one.unseen, strict=True)
+    )
 
 
 def _beside_nothing_missing(level: Level, screen: Screened, jobs: int) -> BesideNullRigs:
