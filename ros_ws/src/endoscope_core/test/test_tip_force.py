@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from endoscope_core.kinematics import tip_lever, tip_pose
 from endoscope_core.physics import EffectSpec, PlantDescription, SensorModel, simulate
 from endoscope_core.tip_force import State, TipForce, TipForceEstimator
+from endoscope_core.tip_force.free_motion import LEAST, MOST, FreeMotion
 
 Array = NDArray[np.float64]
 
@@ -142,3 +143,35 @@ def test_numbers_that_are_none_start_anew(stream: str) -> None:
     assert np.isfinite([f.force[0] for f in found]).all()
     assert estimator.restarts == 1
     assert 'no numbers' in estimator.restarted_because
+
+
+def test_the_least_that_is_seen_is_rare_and_what_few_excursions_show_is_doubted() -> None:
+    generator = np.random.default_rng(1)
+    excess = generator.exponential(1e-4, MOST)
+    many, few = FreeMotion(), FreeMotion()
+    for value in excess:
+        assert not many.is_learnt
+        many.learn(value, value)
+    assert many.is_learnt
+    # Of independent blocks, once in 20 h is once in 2,880,000.
+    assert many.least_seen == pytest.approx(1e-4 * math.log(72_000.0 / 0.025), rel=0.05)
+    assert many.bound == pytest.approx(np.quantile(excess, 0.95), rel=0.01)
+    # The same excesses in three excursions say less of how large the next one is.
+    for value in np.concatenate([np.sort(excess[k : k + 40]) for k in (0, 40, 80)]):
+        few.learn(value, value)
+    assert few.least_seen > 5.0 * many.least_seen
+    few.forget()
+    before = few.least_seen
+    for _ in range(LEAST - 1):
+        few.learn(0.0, 0.0)
+    assert few.least_seen == before
+    few.learn(0.0, 0.0)
+    assert few.least_seen == 0.0
+
+
+def test_bounds_are_learnt_on_until_something_is_seen() -> None:
+    plant = PlantDescription(joints={NAME: PlantDescription().joints[NAME]})
+    estimator = _calibrated(plant)
+    found, _ = _feed(estimator, plant, _sweeps(30.0), 30.0, 5)
+    assert found[-1].visible < 0.7 * found[0].visible
+    assert not any(f.seen for f in found)

@@ -1,7 +1,7 @@
 """The force across the tip, with bounds, while the instrument moves."""
 
 import math
-from bisect import insort
+from collections import deque
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -21,10 +21,10 @@ from endoscope_core.tip_force.external_moment import (
     ExternalMoment,
     MomentSet,
 )
+from endoscope_core.tip_force.free_motion import BLOCK_S, FreeMotion
 
 Array = NDArray[np.float64]
 
-BLOCK_S = BLOCK_TICKS * TICK_S
 AHEAD_S = 2.0 * BLOCK_S
 """By how much a force is later than its samples: the angle is the mean of what the tracker reads
 this long before and after."""
@@ -39,14 +39,11 @@ _LATE_S = 0.3
 SWEEPS, LEAST_RANGE_RAD = 2.0, 0.3
 """Travel over the visited range, and that range in rad of the shaft, after which a joint's memory
 is that of the path: once to either end of it (return-point memory; Mayergoyz, 1991, ch. I)."""
-COVERED = 0.95
-"""Share of free motion in which zero lies within the bounds."""
-FALSE_ALARM_S = 20.0 * 3600.0
-"""Of motion in free space, in which one block may show as much as a force that is seen."""
-TAIL = 0.1
-"""Share of free motion that shows how rare larger misfits are."""
-LEAST_FREE = 100
-"""Blocks of free motion, 2.5 s, from which bounds are known: ten in the tail."""
+REPORTED_WITHIN_S = 0.3
+"""After which a contact is seen."""
+LASTING = int((REPORTED_WITHIN_S - AHEAD_S) / BLOCK_S) - 2
+"""Blocks in a row, 0.2 s, of which all have to show a contact: where a joint breaks away a moment
+earlier or later than its plant, one to four do. Two more are left for the force to grow."""
 
 
 class State(StrEnum):
@@ -109,12 +106,11 @@ class TipForce:
 class _Joint:
     """Observer of one joint, what it has visited, and its misfit in free motion."""
 
-    def __init__(self, observer: ExternalMoment, delay_s: float) -> None:
-        self.observer, self.delay_s = observer, delay_s
+    def __init__(self, observer: ExternalMoment, delay_s: float, free: FreeMotion) -> None:
+        self.observer, self.delay_s, self.free = observer, delay_s, free
         self._way, self._low, self._high = 0.0, math.inf, -math.inf
         self._shaft = math.nan
-        self.free: list[float] = []  # misfits of the blocks, rising, N m
-        self.bound = self.least_seen = math.nan  # N m
+        self._last: deque[MomentSet] = deque(maxlen=LASTING)
 
     @property
     def memory_is_known(self) -> bool:
@@ -129,21 +125,27 @@ class _Joint:
             self._way += float(np.abs(np.diff(shaft, prepend=self._shaft)).sum())
         self._shaft = float(shaft[-1])
         self._low, self._high = min(self._low, shaft.min()), max(self._high, shaft.max())
-        return self.observer.follow(block)
+        self._last.append(self.observer.follow(block))
+        return self._last[-1]
 
-    def learn(self, moments: MomentSet) -> None:
-        """Add a block of free motion to those that the bounds are from."""
-        # By how much zero is outside of the set; negative within it.
-        insort(self.free, max(moments.low, -moments.high))
-        if len(self.free) < LEAST_FREE:
-            return
-        self.bound = max(0.0, self.free[round(COVERED * len(self.free))])
-        # What exceeds a high level does so by an exponentially distributed amount (Pickands,
-        # Ann. Statist. 3(1), 1975, of a light tail).
-        begin = round((1.0 - TAIL) * len(self.free))
-        level, tail = self.free[begin - 1], self.free[begin:]
-        rarity = math.log(TAIL * FALSE_ALARM_S / BLOCK_S)
-        self.least_seen = max(self.bound, level + (sum(tail) / len(tail) - level) * rarity)
+    @property
+    def lasting(self) -> float:
+        """Moment in N m that all of the last blocks exceed on one side; negative where none is."""
+        if len(self._last) < LASTING:
+            return -math.inf
+        return max(min(m.low for m in self._last), -max(m.high for m in self._last))
+
+    @property
+    def is_touched(self) -> bool:
+        """Whether that is more than free motion shows."""
+        return self.lasting > self.free.least_seen
+
+    def learn(self) -> None:
+        """Add the last block to those of free motion."""
+        if len(self._last) == LASTING:
+            last = self._last[-1]
+            # By how much zero is outside of the set; negative within it.
+            self.free.learn(max(last.low, -last.high), self.lasting)
 
 
 class TipForceEstimator:
@@ -151,7 +153,8 @@ class TipForceEstimator:
 
     Samples are added to `motor` (J columns: shafts in rad), `wires` (2 J: both tensions of each
     joint in N) and `tracker` (J: bending in rad) in any portions; `update` gives what can be
-    worked out. While `free` is set, nothing touches the tip, and the bounds are learnt.
+    worked out. While `free` is set, nothing touches the tip, and the bounds are learnt; they are
+    learnt on after it for as long as nothing is seen, from 10 min at most.
 
     Parameters
     ----------
@@ -172,10 +175,9 @@ class TipForceEstimator:
         self.tracker = Samples(count)
         self._streams = {'motors': self.motor, 'load cells': self.wires, 'tracker': self.tracker}
         self._joints: list[_Joint] = []
-        self._learnt: list[tuple[float, float]] = []
+        self._free_motion = [FreeMotion() for _ in self._parameters]
         self._end = math.nan
         self._free = False
-        self._beyond = 0
         self.state = State.NO_SAMPLES
         self.restarts = 0
         self.restarted_because = ''
@@ -188,8 +190,8 @@ class TipForceEstimator:
     @free.setter
     def free(self, free: bool) -> None:
         if free and not self._free:
-            for joint in self._joints:
-                joint.free = []
+            for each in self._free_motion:
+                each.forget()
         self._free = free
 
     def update(self, until: float) -> list[TipForce]:
@@ -241,18 +243,14 @@ class TipForceEstimator:
         shafts = self.motor.between(np.array([first]))[0]
         for j, (p, on) in enumerate(zip(self._parameters, self._on, strict=True)):
             delay_s = float(p[TRACKER_DELAY.first_parameter]) if on[TRACKER_DELAY.flag] else 0.0
-            joint = _Joint(ExternalMoment(p, on, float(shafts[j])), delay_s)
-            if self._learnt:
-                joint.bound, joint.least_seen = self._learnt[j]
-            self._joints.append(joint)
+            observer = ExternalMoment(p, on, float(shafts[j]))
+            self._joints.append(_Joint(observer, delay_s, self._free_motion[j]))
         self._end = first
         return True
 
     def _restart(self, because: str, after: float) -> None:
         """Begin after a time with an unknown memory; bounds that were learnt stay."""
-        if self._joints:
-            self._learnt = [(joint.bound, joint.least_seen) for joint in self._joints]
-        self._joints, self._beyond = [], 0
+        self._joints = []
         self.state = State.NO_SAMPLES
         self.restarts += 1
         self.restarted_because = because
@@ -286,10 +284,12 @@ class TipForceEstimator:
         if not all(joint.memory_is_known for joint in self._joints):
             self.state = State.UNKNOWN_MEMORY
             return None
-        if self._free:
-            for joint, moments in zip(self._joints, sets, strict=True):
-                joint.learn(moments)
-        if any(math.isnan(joint.bound) for joint in self._joints):
+        known = not any(math.isnan(each.bound) for each in self._free_motion)
+        goes_on = known and not any(j.is_touched or j.free.is_learnt for j in self._joints)
+        if self._free or goes_on:
+            for joint in self._joints:
+                joint.learn()
+        if not known:
             self.state = State.NOT_CALIBRATED
             return None
         self.state = State.KNOWN
@@ -298,14 +298,13 @@ class TipForceEstimator:
     def _force(self, time: float, angles: list[float], sets: list[MomentSet]) -> TipForce:
         lever = tip_lever(angles, self.section_length)
         force, low, high, widened = (np.full(2, math.nan) for _ in range(4))
-        touched, visible = False, 0.0
+        visible = 0.0
         for j, (joint, moments) in enumerate(zip(self._joints, sets, strict=True)):
             force[j] = moments.likely / lever
-            widened[j] = joint.bound / lever
+            widened[j] = joint.free.bound / lever
             low[j] = moments.low / lever - widened[j]
             high[j] = moments.high / lever + widened[j]
-            touched |= max(moments.low, -moments.high) > joint.least_seen
             half = 0.5 * (moments.high - moments.low)
-            visible = max(visible, (half + joint.least_seen) / lever)
-        self._beyond = self._beyond + 1 if touched else 0
-        return TipForce(time, force, low, high, widened, visible, self._beyond > 1)
+            visible = max(visible, (half + joint.free.least_seen) / lever)
+        seen = any(joint.is_touched for joint in self._joints)
+        return TipForce(time, force, low, high, widened, visible, seen)

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from endoscope_core.tip_force.estimator import AHEAD_S, BLOCK_S
+from endoscope_core.tip_force.estimator import AHEAD_S, REPORTED_WITHIN_S
+from endoscope_core.tip_force.free_motion import BLOCK_S
 from endoscope_lab.bench import keep_row, report, rows_so_far, side_by_side, table_head, table_row
 from endoscope_lab.touch.touched_rig import SIMULATORS, Touched, touched
 
-REPORTED_WITHIN_S = 0.3
 TWICE = 2.0
 """Times the visible force, from which a contact has to be reported."""
 _FREE_S = 600.0

@@ -14,7 +14,7 @@ from endoscope_core.errors import FileError
 from endoscope_core.kinematics import Vertebrae
 from endoscope_core.physics import PlantDescription
 from endoscope_core.tip_force import State, TipForce, TipForceEstimator
-from endoscope_core.tip_force.estimator import BLOCK_S
+from endoscope_core.tip_force.free_motion import BLOCK_S
 from endoscope_nodes import names
 from endoscope_nodes.client.order_feedback import feedback_of
 from endoscope_nodes.client.plant_adoption import PlantInForce

@@ -1,0 +1,73 @@
+"""What motion in free space leaves of a joint's plant, below which nothing is seen to touch it."""
+
+import math
+
+import numpy as np
+
+from endoscope_core.tip_force.external_moment import BLOCK_TICKS, TICK_S
+
+BLOCK_S = BLOCK_TICKS * TICK_S
+COVERED = 0.95
+"""Share of free motion in which zero lies within the bounds."""
+FALSE_ALARM_S = 20.0 * 3600.0
+"""Of motion in free space, in which one block may show as much as a force that is seen."""
+TAIL = 0.1
+"""Share of free motion that shows how rare larger misfits are."""
+LEAST = 100
+"""Blocks of free motion, 2.5 s, from which bounds are known: ten in the tail."""
+MOST = 24_000
+"""Blocks that are learnt from, 10 min: a contact too light to be seen would be learnt as well."""
+_DERIVED = 40
+"""Blocks after which bounds are derived again, a second."""
+
+
+class FreeMotion:
+    """Misfits of one joint in free space, block by block, and what follows from them.
+
+    Attributes
+    ----------
+    bound : float
+        Moment in N m that free motion exceeds in 5 % of all blocks; NaN while that is not known.
+    least_seen : float
+        Moment in N m that a lasting misfit of free motion exceeds once in 20 h.
+    """
+
+    def __init__(self) -> None:
+        self.bound = self.least_seen = math.nan
+        self._misfits: list[float] = []
+        self._lasting: list[float] = []
+
+    @property
+    def is_learnt(self) -> bool:
+        """Whether no more is learnt."""
+        return len(self._misfits) >= MOST
+
+    def forget(self) -> None:
+        """Begin anew; bounds stay until there are others."""
+        self._misfits, self._lasting = [], []
+
+    def learn(self, misfit: float, lasting: float) -> None:
+        """Add a block by how much zero is outside of its set, and of all of the last ones, N m."""
+        self._misfits.append(misfit)
+        self._lasting.append(lasting)
+        count = len(self._misfits)
+        if count == LEAST or (count > LEAST and count % _DERIVED == 0):
+            self._derive()
+
+    def _derive(self) -> None:
+        ordered = np.sort(self._misfits)
+        self.bound = max(0.0, float(ordered[round(COVERED * len(ordered))]))
+        # What exceeds a high level does so by an exponentially distributed amount (Pickands, Ann.
+        # Statist. 3(1), 1975, of a light tail), in clusters of which each counts once (Leadbetter,
+        # Stat. Probab. Lett. 12, 1991). Of `n` clusters no more than that is known of the mean m:
+        # the next excess is beyond n m (p^(-1/n) - 1) with a chance of p (Geisser, Predictive
+        # Inference, 1993).
+        lasting = np.array(self._lasting)
+        ordered = np.sort(lasting)
+        begin = round((1.0 - TAIL) * len(ordered))
+        level, tail = float(ordered[begin - 1]), ordered[begin:]
+        above = np.concatenate([[False], lasting > level])
+        clusters = max(1, int(np.sum(above[1:] & ~above[:-1])))
+        excess = float(np.mean(tail)) - level
+        rarity = math.log(TAIL * FALSE_ALARM_S / BLOCK_S)
+        self.least_seen = max(0.0, level + clusters * excess * math.expm1(rarity / clusters))
