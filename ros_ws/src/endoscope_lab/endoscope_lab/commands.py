@@ -215,6 +215,7 @@ BENCHES: dict[str, Bench] = {
         (
             _seeds('seeds of rigs that touch something (1-3)'),
             _seeds('seeds of rigs in free space (1-2)', '--free', last=2),
+            _flag('--visible', 'print instead what is seen by the bend of tube and tip'),
             _file('--json', 'file for all rows; cases in it are skipped'),
             _jobs(),
         ),

@@ -107,7 +107,7 @@ def touched(simulator: str, seed: int, obstacle: bool = True, seconds: float = 3
     gear = shipped_rig().joints.gear
     free = motions.teleoperation(generator, count)
     estimator.free = True
-    _watched(estimator, rig.record(_compensated(plant, free), seed + 1)[0], 0.0)
+    watched(estimator, rig.record(compensated(plant, free), seed + 1)[0], 0.0)
     estimator.free = False
     asked = np.concatenate(
         [
@@ -116,10 +116,10 @@ def touched(simulator: str, seed: int, obstacle: bool = True, seconds: float = 3
         ]
     )
     met = _drawn(generator, np.abs(asked).max(axis=0) / gear) if obstacle else None
-    recording, bending = rig.record(_compensated(plant, asked), seed + 2, met)
+    recording, bending = rig.record(compensated(plant, asked), seed + 2, met)
     # Later than the motion before by more than any gap: the memory is found again.
     later = known.duration + motions.HAND_S
-    forces = _watched(estimator, recording, later)
+    forces = watched(estimator, recording, later)
     lever = np.array([tip_lever(q, estimator.section_length) for q in bending])
     moments = rig.moment(met, bending) if met else np.zeros_like(bending)
     stamps = recording.bending.time + later
@@ -146,7 +146,7 @@ def _drawn(generator: np.random.Generator, largest: Array) -> Obstacle:
     return Obstacle(joint, angle, across * lever**2)
 
 
-def _compensated(plant: PlantDescription, shaft: Array) -> Array:
+def compensated(plant: PlantDescription, shaft: Array) -> Array:
     """Shaft commands (N, J) in rad by the plant's inverse for those of a hand without one."""
     rig, tick = shipped_rig(), 1.0 / motions.RATE
     desired = shaft / rig.joints.gear
@@ -162,7 +162,7 @@ def _compensated(plant: PlantDescription, shaft: Array) -> Array:
     return rig.joints.gear * sent
 
 
-def _watched(estimator: TipForceEstimator, recording: RigRecording, later: float) -> list[TipForce]:
+def watched(estimator: TipForceEstimator, recording: RigRecording, later: float) -> list[TipForce]:
     """Forces from a recording whose stamps are later by so many s, in portions as they arrive."""
     measured = recording.measured()
     streams = (

@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 from endoscope_core.tip_force.estimator import AHEAD_S, REPORTED_WITHIN_S
 from endoscope_core.tip_force.free_motion import BLOCK_S
 from endoscope_lab.bench import keep_row, report, rows_so_far, side_by_side, table_head, table_row
+from endoscope_lab.touch import visible
 from endoscope_lab.touch.touched_rig import SIMULATORS, Touched, touched
 
 TWICE = 2.0
@@ -45,6 +46,9 @@ class Row:
 
 def run(args: argparse.Namespace) -> int:
     """Print the tables; return 0."""
+    if args.visible:
+        visible.run(args.seeds[0], args.jobs)
+        return 0
     rows = {(r.simulator, r.seed, r.obstacle): r for r in rows_so_far(args.json, Row)}
     cases = [(s, seed, True) for seed in args.seeds for s in SIMULATORS]
     cases += [(s, seed, False) for seed in args.free for s in SIMULATORS]
