@@ -16,6 +16,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from operated_graph import OPERATED_RATE
 from page_frames import encode_input
 from rclpy.serialization import deserialize_message
+from security_policy import NAMESPACE, allowed
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
@@ -29,6 +30,7 @@ from endoscope_nodes.runtime.qos import EVENT
 from endoscope_nodes.topics import RECORDED
 
 FAR = 0.06
+UNITS = [*['rad'] * 8, *['N'] * 10, '', 'rad', 'rad']
 BUSY = ('silent', 'late', 'stalled', 'blind')
 _PATIENCE_S = 60.0
 _TEN_MEGABYTES = 10_000_000
@@ -103,13 +105,19 @@ def stopped(rig, page):
 def test_a_held_hand_moves_the_slave_and_its_release_stops_it(rig):
     with rig.page() as page:
         assert page.hello['role'] == 'operator'
-        assert [s['unit'] for s in page.hello['signals']] == ['rad'] * 8 + ['N'] * 4
+        assert [s['unit'] for s in page.hello['signals']] == UNITS
         ended(rig, page, lambda: page.does(pressed=False, x=0.0), 'released')
         assert abs(moved(rig)[1]) < 0.01
         assert 1 in rig.clutches
         wanted = page.picture.ranges[0]
         assert np.isnan(wanted).all()
         assert np.isfinite(page.picture.actual).all()
+
+
+def test_the_server_hears_what_the_policy_lets_it_hear(rig):
+    heard = rig.client.node.get_subscriber_names_and_types_by_node('console_web', NAMESPACE)
+    assert heard
+    assert {topic for topic, _ in heard} <= allowed()['console_web']['subscribe']
 
 
 def test_somebody_speaks_for_the_handle_only_while_he_operates_and_leaves_the_source_as_it_was(rig):

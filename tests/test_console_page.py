@@ -17,6 +17,7 @@ from browsed_console import (
     until,
 )
 from playwright.sync_api import expect
+from pushed_tip import PushedTip
 
 SHARE = "(button) => Number(button.style.getPropertyValue('--share'))"
 # Longer than a button has to be held.
@@ -26,10 +27,25 @@ FAR = 0.03
 FOLLOWING = "document.getElementById('lamp').textContent === 'FOLLOWING'"
 GAMEPAD = """
 window.pad = { connected: true, mapping: 'standard', index: 0, id: 'made up', axes: [0, 0, 0, 0],
-  buttons: Array.from({ length: 17 }, () => ({ pressed: false, value: 0 })) };
+  buttons: Array.from({ length: 17 }, () => ({ pressed: false, value: 0 })),
+  vibrationActuator: { playEffect: async (kind, how) => { rumbles.push([kind, how]); } } };
+window.rumbles = [];
 window.plugged = true;
 Navigator.prototype.getGamepads = () => [window.plugged ? window.pad : null];
 """
+ALARMED = """() => {
+  const { width, height } = document.getElementById('space');
+  const copy = new OffscreenCanvas(width, height).getContext('2d', { willReadFrequently: true });
+  copy.drawImage(document.getElementById('space'), 0, 0);
+  const { data } = copy.getImageData(0, 0, width, height);
+  const found = [];
+  for (let k = 0; k < data.length; k += 4) {
+    const is = data[k] > 240 && data[k + 1] < 80 && data[k + 2] < 70;
+    if (is) found.push(((k / 4) % width) / width);
+  }
+  return found;
+}"""
+"""Where the view has the colour of an alarm, 0 to 1 across it."""
 REPEATS = """
 Object.defineProperty(WebSocket.prototype, 'onmessage', { set(take) {
   this.addEventListener('message', ({ data }) => {
@@ -179,6 +195,37 @@ def test_a_gamepad_holds_and_lets_go_when_unplugged(console, browser):
         expect(page.locator('#device')).to_contain_text('position')
         page.evaluate('pad.buttons[8].pressed = true')
         shows(page, 'state', 'PAUSED')
+
+
+def test_a_force_at_the_tip_is_drawn_felt_and_alarmed_until_it_is_silent(console, browser):
+    tip = console.ask(PushedTip)
+    viewport = {'width': 1024, 'height': 768}
+    with console.page(browser, script=GAMEPAD, viewport=viewport) as page:
+        shows(page, 'force-why', 'no force: silent')
+        take(page)
+        tip.force = 0.03, -0.02
+        shows(page, 'force-between', 'nothing above 0.08 N')
+        assert page.evaluate('rumbles') == []
+        tip.force = -0.24, 0.07
+        shows(page, 'force-size', '0.25 N')
+        shows(page, 'force-between', '(0.18 to 0.33)')
+        expect(page.locator('#alarms .high')).to_contain_text(['0.25 N at the tip, above 0.2 N'])
+        until(page, lambda: len(page.evaluate(ALARMED)) > 100, 'an arrow')
+        assert min(page.evaluate(ALARMED)) > 0.5, 'it comes from the right, where it pushes from'
+        until(page, lambda: page.evaluate('rumbles.length > 1'), 'a rumble')
+        kind, how = page.evaluate('rumbles.at(-1)')
+        assert (kind, how['strongMagnitude']) == ('dual-rumble', 1)
+        page.uncheck('#rumble')
+        felt = page.evaluate('rumbles.length')
+        tip.force = -0.14, 0.0
+        shows(page, 'force-size', '0.14 N')
+        expect(page.locator('#alarms')).not_to_contain_text('N at the tip')
+        assert page.evaluate('rumbles.length') == felt
+        tip.force = None
+        shows(page, 'force-why', 'no force: silent')
+        expect(page.locator('#force-bar')).to_be_hidden()
+        until(page, lambda: page.evaluate(ALARMED) == [])
+    console.ask(lambda _: tip.close())
 
 
 @pytest.mark.parametrize(

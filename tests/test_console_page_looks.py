@@ -6,6 +6,7 @@ import browsed_console
 import pytest
 from browsed_console import shows
 from playwright.sync_api import expect
+from pushed_tip import PushedTip
 
 pytestmark = pytest.mark.nightly
 
@@ -122,6 +123,20 @@ def test_all_of_it_fits_on_the_screen(console, browser, width, height, touch):
         assert page.evaluate(f'[{root}.scrollWidth, {root}.scrollHeight]') == [width, height]
         sizes = page.evaluate(SIZES)
         assert sizes['state'] == max(sizes.values()), 'the state is the largest word'
+
+
+def test_the_force_has_a_plot_and_a_loop_and_hides_nothing(console, browser):
+    tip = console.ask(PushedTip)
+    tip.force = -0.24, 0.07
+    with console.page(browser) as page:
+        plot = page.locator('#plots figure', has_text='force at the tip')
+        expect(plot.locator('[data-value]')).to_have_text(['-0.24', '0.07'])
+        page.click('#loops-force')
+        expect(page.locator('#loops [data-of]')).to_have_text(['force', 'force'])
+        assert page.evaluate(CUT, False) == []
+        page.click('#loops-force')
+        expect(page.locator('#loops [data-of]')).to_have_text(['RMS error', 'RMS error'])
+    console.ask(lambda _: tip.close())
 
 
 def test_nothing_is_cut_or_out_of_reach_in_a_small_window(console, browser):

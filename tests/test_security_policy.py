@@ -12,6 +12,7 @@ SOLE_PUBLISHERS = {
     'slave/servo_cv': {'handle'},
     'motor/servo_jp': {'compensator'},
     'slave/operating_state': {'supervisor'},
+    'tip_force/bounds': {'tip_force'},
     'slave/motion_session': {'supervisor'},
     'slave/state_command': {'operator', 'console_web', 'investigate'},
     'master/clutch': {'master', 'handle', 'console_web', 'investigate'},

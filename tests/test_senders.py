@@ -9,8 +9,9 @@ import time
 import commanded_graph
 import numpy as np
 import pytest
-from commanded_graph import BOUND, STILL, TICK_RATE, TICK_S, Handle, Moved, Sender, run, ticks
+from commanded_graph import BOUND, RIG, STILL, TICK_RATE, TICK_S, Handle, Moved, Sender, run, ticks
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import WrenchStamped
 from rclpy.node import Node
 from rclpy.time import Time
 from sensor_msgs.msg import JointState, Joy
@@ -19,6 +20,7 @@ from std_msgs.msg import Header, String
 
 from endoscope_core.safety import Refusal
 from endoscope_nodes.names import (
+    BOUNDS,
     CALIBRATION_RESULT,
     CORRECTION,
     JOINTS,
@@ -29,6 +31,8 @@ from endoscope_nodes.names import (
     MOTORS,
     OPERATING_STATE,
     SLAVE_COMMAND,
+    TIP_FORCE,
+    TIP_FORCE_BOUNDS,
 )
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, status
 from endoscope_nodes.runtime.qos import COMMAND, EVENT, RESULT, SENSOR_OFFERED
@@ -262,6 +266,60 @@ def test_a_session_that_ends_before_the_nodes_next_turn_is_left():
         for heartbeat in ('session-of-a-moment', ''):
             session._hear(Header(frame_id=heartbeat))
         assert left == ['']
+
+
+FORCES = ([0.5, -0.5, 0.4, -0.6, 0.6, -0.4, 1.0], [-9.0, 9.0, -9.1, 8.9, -8.9, 9.1, 1.0])
+
+
+def test_a_stranger_who_says_what_the_tip_touches_moves_nothing_and_only_slows(foreign, master):
+    """Alone, for the node that works it out does not run; nobody hears the force without bounds."""
+    stranger = Sender(foreign, TIP_FORCE_BOUNDS, BOUNDS, SENSOR_OFFERED)
+    forces = foreign.speak(WrenchStamped, TIP_FORCE, SENSOR_OFFERED)
+    guard = foreign.nodes['compensator'].stream.contact
+    master.move(0.2)
+    master.hold(0)
+    foreign.advance(0.3)
+    moved = Moved(foreign)
+    for k in range(60):
+        values = FORCES[k % 2] if k < 40 else [math.nan] * len(BOUNDS)
+        stranger.send([], effort=values)
+        forces.publish(WrenchStamped())
+        foreign.advance(0.01)
+    assert moved.goals == []
+    assert moved.of_shafts < STILL
+    master.start, master.way = foreign.nodes['compensator']._pose.bending(), 0.0
+    asked = []
+    stranger.send([], effort=FORCES[0])
+    foreign.advance(0.05)
+    assert guard.joints == JOINTS
+    master.hold(1)
+    moved.clear()
+    for k in range(30):
+        stranger.send([], effort=FORCES[k % 2])
+        master.move(0.02)
+        asked.append(master.angle)
+    way = np.ptp([s.position for s in moved.goals], axis=0) / RIG.joints.gear
+    assert way.max() <= np.ptp(asked, axis=0).max() + STILL
+    assert moved.largest_step < BOUND
+    assert foreign.state == 'ENABLED'
+    for publisher in (stranger.publisher, forces):
+        foreign.probe.destroy_publisher(publisher)
+
+
+def test_two_who_say_what_the_tip_touches_are_a_fault():
+    with run() as graph:
+        stranger = Sender(graph, TIP_FORCE_BOUNDS, BOUNDS, SENSOR_OFFERED)
+        stranger.send([], effort=FORCES[0])
+        graph.advance(0.1)
+        assert graph.state == 'ENABLED'
+        message = JointState(name=list(BOUNDS), effort=FORCES[1])
+        compensator = graph.nodes['compensator']
+        leave_behind(graph, compensator, TIP_FORCE_BOUNDS, message, SENSOR_OFFERED)
+        felt = compensator.stream.contact.in_words()
+        graph.advance(0.1)
+        assert compensator.stream.contact.in_words() == felt
+        assert graph.state == 'FAULT'
+        assert TIP_FORCE_BOUNDS in graph.cause
 
 
 # ---- nodes that vanish and come back

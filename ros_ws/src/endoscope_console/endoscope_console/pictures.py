@@ -1,6 +1,7 @@
 """Pictures of the slave: every sample that came, as ranges and two lines, thirty times a second."""
 
 import math
+from collections import deque
 from collections.abc import Iterator
 
 import numpy as np
@@ -12,12 +13,14 @@ from endoscope_bags.errors import MalformedMessageError
 from endoscope_console.teleop.frames import POINTS, encode_telemetry
 from endoscope_core.kinematics import centre_line
 from endoscope_nodes.names import (
+    BOUNDS,
     JOINTS,
     MOTOR_COMMAND,
     MOTOR_MEASURED,
     MOTORS,
     SLAVE_COMMAND,
     SLAVE_MEASURED,
+    TIP_FORCE_BOUNDS,
     WIRES,
     WIRES_MEASURED,
 )
@@ -31,10 +34,17 @@ _STREAMS = (
     (MOTOR_COMMAND, MOTORS, 'wanted', 'rad'),
     (MOTOR_MEASURED, MOTORS, 'measured', 'rad'),
     (WIRES_MEASURED, WIRES, 'tension', 'N'),
+    (TIP_FORCE_BOUNDS, BOUNDS, 'at the tip', 'N'),
 )
+# No topic: a force is 0.1 s late, and with it come the angles of its own time.
+_OF_FORCE = ('tip_force/angles', JOINTS, 'where the force is', 'rad')
 SIGNALS = tuple(
-    {'name': f'{topic}:{name}', 'label': f'{name.replace("_", " ")}, {label}', 'unit': unit}
-    for topic, names, label, unit in _STREAMS
+    {
+        'name': f'{topic}:{name}',
+        'label': f'{name.replace("_", " ")}, {label}',
+        'unit': '' if name == BOUNDS[-1] else unit,
+    }
+    for topic, names, label, unit in (*_STREAMS, _OF_FORCE)
     for name in names
 )
 """What the ranges of a picture are of, in their order."""
@@ -77,13 +87,13 @@ class Stream:
     def __init__(self, node: Node, topic: str, names: tuple[str, ...]) -> None:
         self._reader = JointReader(names)
         self._subscription = RawSubscription(node, JointState, topic, _QUEUE)
-        self._of_effort = names == WIRES
-        self.last: JointSample | None = None  # the newest sample; None before the first
+        self._of_effort = names in (WIRES, BOUNDS)
+        self.recent: deque[JointSample] = deque(maxlen=_REMEMBERED)  # the newest samples
         self.heard_ns = 0  # when it came, by this machine's clock
         self.malformed = 0
 
     def take(self) -> list[tuple[float, ...]]:
-        """Return the values of the samples that wait: rad, for wires N; each of shape (J,)."""
+        """Return the values of the samples that wait, each of shape (J,): rad, of efforts N."""
         values = []
         for data, info in self._subscription.take():
             try:
@@ -94,8 +104,20 @@ class Stream:
             of = sample.effort if self._of_effort else sample.position
             if of:
                 values.append(of)
-                self.last, self.heard_ns = sample, info['received_timestamp']
+                self.recent.append(sample)
+                self.heard_ns = info['received_timestamp']
         return values
+
+    @property
+    def last(self) -> JointSample | None:
+        """The newest sample; None before the first."""
+        return self.recent[-1] if self.recent else None
+
+    def position_at(self, stamp_ns: int) -> list[float]:
+        """Angles (J,) in rad between the samples around a stamp; NaN where it lies outside."""
+        stamps = [sample.stamp_ns - stamp_ns for sample in self.recent]
+        columns = zip(*(sample.position for sample in self.recent), strict=True)
+        return [float(np.interp(0, stamps, c, math.nan, math.nan)) for c in columns]
 
     def position(self, now_ns: int, lasts_ns: int) -> tuple[float, ...] | None:
         """The newest angles in rad, shape (J,); None where they came longer ago than they last."""
@@ -106,6 +128,11 @@ class Stream:
     def close(self) -> None:
         """Leave the topic."""
         self._subscription.close()
+
+
+def _push(bounds: tuple[float, ...]) -> float:
+    x, y, *_, seen = bounds
+    return float(np.hypot(*np.nan_to_num((x, y)))) if seen == 1.0 else 0.0
 
 
 class Pictures:
@@ -125,16 +152,24 @@ class Pictures:
         # The compensator puts out commands for the motors: what is wanted is obeyed.
         self.drives = False
         self.tracked_age_s = math.inf  # since the tracker was heard; infinite before
+        # Largest force in N of what is seen to touch the tip, in the newest picture; 0 for none.
+        self.push = 0.0
+        self.force_age_s = math.inf  # since a force was heard; infinite before
 
     def make(self, now_ns: int, wall_ns: int) -> bytes:
         """Make one of all that has come since the last; now in ns, `now_ns` by a steady clock."""
+        command, measured, motors, _, wires, forces = self._streams
+        self.push = 0.0
         for signal, stream in self._of_signals():
             values = stream.take()
             if values:
                 columns: NDArray[np.float64] = np.array(values, dtype=float).T
                 for k, column in enumerate(columns):
                     self._envelope.take(signal + k, column)
-        command, measured, motors, _, wires = self._streams
+            if stream is forces and stream.last is not None and values:
+                self.push = max(map(_push, values))
+                for k, angle in enumerate(measured.position_at(stream.last.stamp_ns)):
+                    self._envelope.take(signal + len(BOUNDS) + k, [angle])
         self.drives = motors.position(wall_ns, _FRESH_NS) is not None
         self.wanted = command.position(wall_ns, _FRESH_NS)
         if self.wanted is not None:
@@ -143,7 +178,10 @@ class Pictures:
             self.tensions = wires.last.effort
         if measured.last is not None:
             self.tracked_age_s = (wall_ns - measured.heard_ns) * 1e-9
-        newest = max(self._streams, key=lambda stream: stream.heard_ns)
+        if forces.last is not None:
+            self.force_age_s = (wall_ns - forces.heard_ns) * 1e-9
+        # A force has the stamp of what it is from.
+        newest = max(self._streams[:-1], key=lambda stream: stream.heard_ns)
         stamp_s = newest.last.stamp_ns * 1e-9 if newest.last is not None else math.nan
         age_s = max(0, wall_ns - newest.heard_ns) * 1e-9 if newest.last is not None else math.nan
         self.seq += 1

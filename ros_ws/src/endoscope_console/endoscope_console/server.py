@@ -133,6 +133,8 @@ class Console:
                 'limits': {
                     'reach': self.rig.joints.reach,
                     'tension_ceiling': self.rig.tension.ceiling,
+                    'force': self.rig.tip.force_limit,
+                    'force_alarm': self.rig.tip.force_alarm,
                 },
                 'section_length': self.rig.instrument.section_length,
                 'points': POINTS,

@@ -14,6 +14,7 @@ from endoscope_console.graph_side import GraphSide, is_calibrated
 from endoscope_console.operations import Operations
 from endoscope_console.teleop.lease import UNATTENDED_NS
 from endoscope_console.teleop.operator import STATE_NS, DeadManState, Reason
+from endoscope_console.tip import FORCE, GUARD, TipAlarms, number, tip_state
 from endoscope_core.rig import Rig
 from endoscope_nodes.client.calibration_result import NONE_OF_THEM
 from endoscope_nodes.client.graph_client import GraphClient
@@ -47,6 +48,7 @@ class View:
         self._rig = rig
         self._counts = counts
         self._rate = rate
+        self._tip_alarms = TipAlarms(rig.tip.force_alarm)
         self._sent: dict[str, Any] = {}
         self._sent_ns = 0
 
@@ -70,7 +72,7 @@ class View:
                 'time': self._time(),
                 'recorder': {
                     **steady['recorder'],
-                    'messages': None if recorder is None else _number(recorder, 'messages'),
+                    'messages': None if recorder is None else number(recorder, 'messages'),
                 },
                 'nodes': self._nodes(),
                 'counters': dict(self._counts)
@@ -134,6 +136,7 @@ class View:
             'adopted': _adopted(self._graph.plants.in_force),
             'recorder': _recorder(client.health.get(RECORDER)),
             'console': {'source': settings.source, 'scale': settings.scale},
+            'tip': tip_state(client.health.get(FORCE), pictures.force_age_s),
             'playing': self._playing(),
             'prepares': operations.controls.playing.prepares,
             'investigates': operations.controls.playing.investigates,
@@ -156,7 +159,7 @@ class View:
             return None
         health = self._client.health.get(MASTER)
         done, length = (
-            None if health is None else _number(health, f'{key} [s]')
+            None if health is None else number(health, f'{key} [s]')
             for key in ('progress', 'length')
         )
         share = done / length if done is not None and length else 0.0
@@ -243,7 +246,9 @@ class View:
             found.append((True, Alarm('refused', Urgency.MEDIUM, refused)))
         if recorder is not None and recorder.level:
             found.append((True, Alarm('recorder', Urgency.MEDIUM, recorder.message)))
-        return [alarm for is_so, alarm in found if is_so]
+        push, guard = self._graph.pictures.push, client.health.get(GUARD)
+        tip = self._tip_alarms.update(now_ns, push, guard)
+        return [*(alarm for is_so, alarm in found if is_so), *tip]
 
 
 def busy(load: float, cores: int, pace: float | None, rate: int) -> str:
@@ -259,27 +264,19 @@ def _counted(cores: int) -> str:
     return '1 core' if cores == 1 else f'{cores} cores'
 
 
-def _number(health: Health, key: str) -> float | None:
-    try:
-        value = float(health.values[key])
-    except (KeyError, ValueError):
-        return None
-    return value if math.isfinite(value) else None
-
-
 def result(health: Health | None) -> dict[str, Any] | None:
     """The last calibration, for a person: in degrees."""
     if health is None:
         return None
     size, low, high = (
-        None if (value := _number(health, f'regressed_size{end}')) is None else math.degrees(value)
+        None if (value := number(health, f'regressed_size{end}')) is None else math.degrees(value)
         for end in ('', '_low', '_high')
     )
     return {
-        'class_deg': _number(health, 'class_deg'),
+        'class_deg': number(health, 'class_deg'),
         'none': health.values.get('class_deg') == NONE_OF_THEM,
-        'probability': _number(health, 'probability'),
-        'size_deg': _number(health, 'backlash_size_deg') if size is None else size,
+        'probability': number(health, 'probability'),
+        'size_deg': number(health, 'backlash_size_deg') if size is None else size,
         'low_deg': low,
         'high_deg': high,
         'level': _LEVELS[_level(health)],

@@ -8,7 +8,7 @@ from endoscope_core.compensation.law_in_force import LawInForce, Selection
 from endoscope_core.control import AdoptionError, Feedforward, FeedforwardSettings, MotorLimits
 from endoscope_core.identification.law_choice import CalibrationFindings, LawChoice
 from endoscope_core.rig import shipped_rig
-from endoscope_core.safety import AdoptionCode, BendingRange, Refusal
+from endoscope_core.safety import AdoptionCode, BendingRange, FeltForce, Refusal
 
 RIG = shipped_rig()
 GEAR = RIG.joints.gear
@@ -45,6 +45,11 @@ class Slave:
         if out:
             self.shafts = out
         return out
+
+    def feel(self, force):
+        """Have a force on the first joint that is certain, in N."""
+        low, high = (force - 0.02, 0.0), (force + 0.02, 0.0)
+        self.stream.contact.feel(FeltForce(self.now_ns, (force, 0.0), low, high, True))
 
     def watch(self, pause_ms=0):
         self.now_ns += pause_ms * MS
@@ -152,3 +157,42 @@ def test_plants_are_exchanged_only_at_rest():
     slave.shafts = REST
     slave.command(0.0, Commander.CALIBRATION)
     assert refusal() == AdoptionCode.MOVING
+
+
+def test_the_master_goes_on_slowly_against_a_force_and_calibration_freely():
+    slave, angles = Slave(), 0.001 * np.arange(200)
+    for angle in angles:
+        slave.command(angle)
+    slave.feel(-0.3)
+    before = slave.shafts[0]
+    for angle in angles:
+        slave.command(0.2 + angle)
+    # Twice what 2 mm/s are in that time, and the last of the motion before.
+    assert slave.shafts[0] - before < 2.0 * 0.2 * 0.2 * GEAR + 0.01
+    assert slave.stream.contact.in_words().startswith('yielding: bend_x pushes')
+    begin = slave.shafts[0] / GEAR
+    for angle in angles:
+        slave.command(begin + angle, Commander.CALIBRATION)
+    assert slave.shafts[0] / GEAR == pytest.approx(begin + angles[-1], abs=0.01)
+
+
+def test_a_correction_does_not_push_on_where_the_guard_holds():
+    slave = Slave()
+    for k in range(100):
+        slave.command(0.0005 * k)
+    slave.feel(-0.3)
+    before = slave.shafts[0]
+    for _ in range(100):
+        slave.stream.correct(Command(slave.now_ns, (0.2, 0.0)), slave.now_ns)
+        slave.command(0.0005 * 99)
+        slave.feel(-0.3)
+    assert not slave.stream.corrected
+    assert abs(slave.shafts[0] - before) < 0.01
+
+
+def test_a_stream_that_begins_against_a_force_begins_where_the_slave_is():
+    slave = Slave()
+    slave.feel(-0.3)
+    for _ in range(20):
+        slave.command(0.05)
+    assert slave.shafts[0] < 0.2 * 0.02 * GEAR + 1e-6

@@ -13,6 +13,7 @@ SLAVE_VELOCITY = 'slave/servo_jv'
 TIP_VELOCITY = 'slave/servo_cv'
 SLAVE_MEASURED = 'slave/measured_js'
 TIP_FORCE = 'slave/body/measured_cf'
+TIP_FORCE_BOUNDS = 'tip_force/bounds'
 CALIBRATION_COMMAND = 'calibration/servo_jp'
 CALIBRATION_RESULT = 'calibration/result'
 CALIBRATION_FEEDBACK = 'calibration/feedback'
@@ -49,6 +50,9 @@ WATCH_RESTART = 'watch/restart'
 LOAD_CELLS_TARE = 'load_cells/tare'
 REGISTER_STRAIGHT = 'em_tracker/register_straight'
 MOTOR_REBOOT = 'motor/reboot'
+
+# What stands on `tip_force/bounds`.
+BOUNDS = ('force_x', 'force_y', 'low_x', 'low_y', 'high_x', 'high_y', 'seen')
 
 # What `simulation_clock: lock-step` says on /diagnostics: simulated seconds in a real one.
 FACTOR = 'real-time factor'

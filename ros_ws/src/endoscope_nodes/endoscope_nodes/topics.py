@@ -112,7 +112,13 @@ TOPICS = (
           '40 Hz, 0.1 s late, where it is known',
           "force on the tip across its axis in N, `force.x` and `force.y` in the tip's frame, "
           'positive where it pushes towards a positive angle; `force.z`, along the axis, cannot be '
-          'seen and is NaN, and torques are taken for zero. Bounds are on `/diagnostics`'),
+          'seen and is NaN, and torques are taken for zero. Bounds are on `tip_force/bounds`'),
+    GraphTopic(names.TIP_FORCE_BOUNDS, _JOINT_STATE, *_SENSOR, ('tip_force',), ('compensator',),
+          '40 Hz, 0.1 s late, where it is known',
+          'the same with bounds, for the guard of the compensator: `effort` in N of `force_x` and '
+          '`force_y`, `low_x` to `high_y` the smallest and the largest that friction leaves open, '
+          'and `seen` 1 where something touches the tip, or 0; NaN for a joint that the plant does '
+          'not have', one_sender=True),
     GraphTopic(names.TRACKER_POSE, 'geometry_msgs/msg/PoseStamped', *_SENSOR, ('em_tracker',), (),
           '40 Hz', "pose of the tip in the frame of the instrument's base: m, and a quaternion"),
     GraphTopic(names.CALIBRATION_COMMAND, _JOINT_STATE, *_COMMANDS, ('calibration',), _MOVERS,

@@ -8,6 +8,8 @@ import { isMotionKey } from './hands.js';
 const PERIOD_MS = 20;
 /** A drag is sent at most this often, so that no mouse is fast enough to be taken for a flood. */
 const MOVE_MS = 10;
+/** Length of one rumble, which is asked for anew at half of it: a page that hangs stops rumbling. */
+const RUMBLE_MS = 200;
 /** After the page has come to the front, no key that goes down is taken for a press. */
 const SETTLED_MS = 500;
 
@@ -23,7 +25,8 @@ export class DeadMan {
    * @param hands what is pressed and pulled
    * @param areas `{pad, thumb}`: elements
    * @param page `mine()`: whether this page has the controls, `speaks()`: or is about to; `shown()`: whether the section can be seen;
-   *   `seen()`: last picture drawn; `send(frame)`; `asked(what)`: a gamepad's button; `ended(reason)`: a grip was ended
+   *   `seen()`: last picture drawn; `send(frame)`; `asked(what)`: a gamepad's button; `ended(reason)`: a grip was ended;
+   *   `rumble()`: how strongly the gamepad rumbles now, 0 to 1
    */
   constructor(hands, areas, page) {
     this._hands = hands;
@@ -34,6 +37,8 @@ export class DeadMan {
     this._pad = null;
     this.gamepadLost = false;
     this.gamepadUnknown = false;
+    this.rumbleRefused = '';
+    this._rumbledAt = -Infinity;
     this._keys();
     for (const [name, element] of Object.entries(areas)) this._area(name, element);
     this._ends();
@@ -43,6 +48,12 @@ export class DeadMan {
   /** Whether a gamepad is read. */
   get hasGamepad() {
     return this._pad !== null;
+  }
+
+  /** Whether the gamepad can rumble. */
+  get canRumble() {
+    const motors = this._pad?.vibrationActuator;
+    return Boolean(motors?.playEffect) && (motors.effects?.includes('dual-rumble') ?? true);
   }
 
   /** End the grip, and say so at once. */
@@ -81,9 +92,24 @@ export class DeadMan {
     const asked = pad ? this._hands.gamepad({ axes: pad.axes, buttons }) : [];
     this._page.asked(asked);
     if (held !== this._hands.held) this.send();
+    this._rumble();
+  }
+
+  _rumble() {
+    // Of a hidden page it would be refused.
+    const may = this.canRumble && !this.rumbleRefused && document.visibilityState === 'visible';
+    const strength = may ? this._page.rumble() : 0;
+    const now = performance.now();
+    if (!strength || now - this._rumbledAt < RUMBLE_MS / 2) return;
+    this._rumbledAt = now;
+    const how = { duration: RUMBLE_MS, strongMagnitude: strength, weakMagnitude: strength };
+    this._pad.vibrationActuator.playEffect('dual-rumble', how).catch(({ message }) => {
+      this.rumbleRefused = message;
+    });
   }
 
   _unplugged() {
+    this.rumbleRefused = '';
     this.gamepadLost = true;
     const held = this._hands.held;
     this._hands.gamepad(null);

@@ -12,6 +12,7 @@ import { Operate } from './operate.js';
 import { Plots, places, scalesOf } from './plots.js';
 import { See } from './see.js';
 import { Orders, Socket } from './sockets.js';
+import { TipForce, rumble, showForce } from './tip_force.js';
 import { View3d } from './view3d.js';
 
 const LOST = 'The controls are lost.';
@@ -38,7 +39,7 @@ const now = () => performance.now() / 1000;
 
 const app = {
   hands: new Hands(), deadMan: null, orders: new Orders(command),
-  state: null, picture: null, signals: [], modes: [], ceiling: 60, you: null, role: null,
+  state: null, picture: null, signals: [], modes: [], limits: { tension_ceiling: 60, force: 1, force_alarm: 1 }, tipForce: new TipForce(), you: null, role: null,
   mine: false, claiming: false, connected: false, everConnected: false, endedHere: '', endedGrip: 0, pictures: 0, picturesLost: 0,
   touch: matchMedia('(pointer: coarse)').matches,
   whyClosed: '', whyLost: '', lostAt: -Infinity, claimedAt: 0, stateArrived: 0, tab: 'operate',
@@ -74,7 +75,7 @@ const operate = new Operate(app);
 const see = new See(app);
 const explain = new Explain(app);
 const view = new View3d($('space'), $('view-reset'));
-const loops = new Loops([...document.querySelectorAll('#loops figure')]);
+const loops = new Loops([...document.querySelectorAll('#loops figure')], $('loops-force'));
 let plots = null;
 let past = null;
 let at = null;
@@ -90,6 +91,7 @@ app.deadMan = new DeadMan(app.hands, { pad: $('pad'), thumb: $('thumb') }, {
   seen: () => drawn,
   send: (frame) => command.send(encodeInput(frame)),
   asked: (what) => operate.gamepadAsked(what),
+  rumble: () => (app.mine && app.shown() && app.sees() && $('rumble').checked ? rumble(app.state?.tip, app.tipForce.now, app.limits.force_alarm) : 0),
   ended(reason) {
     app.endedHere = reason;
     app.endedGrip = app.hands.grips;
@@ -138,8 +140,9 @@ command.addEventListener('message', ({ detail }) => {
 });
 telemetry.addEventListener('hello', ({ detail }) => {
   app.signals = detail.signals;
-  app.ceiling = detail.limits?.tension_ceiling ?? 60;
-  $('highest-bar').max = app.ceiling;
+  app.limits = detail.limits;
+  $('highest-bar').max = app.limits.tension_ceiling;
+  app.tipForce.clear();
   loops.clear();
   past = new History(detail.signals.length, { scales: scalesOf(detail.signals) });
   at = places(detail.signals);
@@ -161,6 +164,9 @@ telemetry.addEventListener('frame', ({ detail }) => {
   at.wanted.forEach((wanted, joint) => {
     loops.take(joint, app.state?.compensator?.mode, past.last(wanted), past.last(at.actual[joint]));
   });
+  const force = at.force.map((s) => past.last(s));
+  app.tipForce.take(picture.stamp, force, app.state?.tip);
+  at.along.forEach((place, joint) => loops.takeForce(joint, past.last(place), force[joint]));
   fresh = true;
 });
 telemetry.addEventListener('message', ({ detail }) => {
@@ -210,7 +216,8 @@ function draw() {
   frames += 1;
   if (app.tab === 'operate') {
     const tensions = tensionsNow();
-    view.draw({ ...picture, tensions, ceiling: app.ceiling });
+    const level = app.state?.alarms?.find(({ id }) => id === 'force')?.level;
+    view.draw({ ...picture, tensions, ceiling: app.limits.tension_ceiling, push: { force: app.tipForce.arrow, alarm: app.limits.force_alarm, level } });
     drawn = picture.seq;
     readings(tensions);
   }
@@ -236,6 +243,7 @@ function readings(tensions) {
   const off = [wx, wy, x, y].includes(null) ? null : Math.hypot(wx - x, wy - y);
   write($('off'), off === null ? '–' : `${off.toFixed(1)}°`);
   const highest = Math.max(...tensions);
+  showForce(app.sees() ? app.state?.tip : null, app.tipForce.now, app.limits);
   write($('highest'), Number.isFinite(highest) ? `${highest.toFixed(1)} N` : '–');
   $('highest-bar').value = Number.isFinite(highest) ? highest : 0;
 }

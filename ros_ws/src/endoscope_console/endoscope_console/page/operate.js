@@ -17,6 +17,7 @@ const SLIDING_MS = 1000;
 const SCALE_SETTLES_MS = 1500;
 /** A protective stop is not unlocked by the hand that is still pressing. */
 const FAULT_REST_S = 2;
+const RUMBLE = 'endoscope rumble';
 
 const deg = (value, digits = 0) => (Number.isFinite(value) ? `${value.toFixed(digits)}°` : '–');
 
@@ -221,7 +222,9 @@ export class Operate {
     let device = this.app.touch ? '' : 'keys: arrows, or W A S D';
     if (deadMan?.gamepadUnknown) device = 'unsupported gamepad mapping: use another gamepad or browser';
     else if (deadMan?.hasGamepad) device = `gamepad: hold RB; stick asks for ${hands.modes.gamepad}`;
+    if (deadMan?.rumbleRefused) device += `; it does not rumble: ${deadMan.rumbleRefused}`;
     write($('device'), device);
+    toggle($('rumble').parentElement, 'hidden', !deadMan?.canRumble);
   }
 
   _renderTube(state) {
@@ -362,6 +365,11 @@ export class Operate {
     $('scale').addEventListener('change', ({ target }) => {
       target.blur();
       this._set('scale', SCALES[Number(target.value)]);
+    });
+    $('rumble').checked = localStorage.getItem(RUMBLE) !== 'off';
+    $('rumble').addEventListener('change', ({ target }) => {
+      target.blur();
+      localStorage.setItem(RUMBLE, target.checked ? 'on' : 'off');
     });
     click('help-open', () => this._help());
   }

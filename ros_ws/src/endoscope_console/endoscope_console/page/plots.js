@@ -1,11 +1,14 @@
-/** A minute of wanted and actual angles, their differences and the tensions, on one time axis. */
+/** A minute of wanted and actual angles, their differences, the force at the tip and the tensions, on one time axis. */
 
 import { DEG } from './history.js';
 
 const SPAN_S = 60;
+/** Which of the plots is the force's. */
+const FORCE = 3;
 const STEPS_DEG = [10, 20, 30, 45, 60, 90, 120, 180];
 const STEPS_ERROR = [2, 5, 10, 20, 45, 90, 180];
 const STEPS_N = [20, 40, 60, 80, 120, 200];
+const STEPS_FORCE_N = [0.2, 0.5, 1, 2, 5, 10, 20];
 
 /** The smallest of `steps` that holds all of `low` to `high`, so that a scale changes seldom. */
 export function holding(steps, low, high) {
@@ -28,7 +31,11 @@ const upwards = (steps) => (_, low, high) => [0, holding(steps, 0, high)];
 /** Indices of the plotted signals among those of hello. */
 export function places(signals) {
   const at = (topic) => signals.flatMap(({ name }, k) => (name.startsWith(`${topic}:`) ? [k] : []));
-  return { wanted: at('slave/servo_jp'), actual: at('slave/measured_js'), tensions: at('wires/measured_js') };
+  return {
+    wanted: at('slave/servo_jp'), actual: at('slave/measured_js'), tensions: at('wires/measured_js'),
+    // Along x and y of the tip, its bounds, and whether it is seen; the angles where it was.
+    force: at('tip_force/bounds'), along: at('tip_force/angles'),
+  };
 }
 
 /** Factors from SI to what a person reads: degrees and newtons. */
@@ -36,7 +43,7 @@ export const scalesOf = (signals) => signals.map(({ unit }) => (unit === 'rad' ?
 
 export class Plots {
   /**
-   * @param boxes elements for bend_x, bend_y, error and tensions, each with a `.plot` and `[data-value]` in its head
+   * @param boxes elements for bend_x, bend_y, error, force and tensions, each with a `.plot` and `[data-value]` in its head
    * @param signals as listed in hello
    */
   constructor(boxes, signals) {
@@ -44,16 +51,18 @@ export class Plots {
     this._colour = (name) => style.getPropertyValue(`--${name}`).trim();
     this._places = places(signals);
     this._boxes = boxes;
-    this._turn = true;
+    this._turn = 0;
     // In grey, or with colour blindness, they are distinguished by their dashes.
     const wires = [['wire-x-pos', []], ['wire-x-neg', [7, 4]], ['wire-y-pos', [2, 3]], ['wire-y-neg', [9, 3, 2, 3]]];
     // What is wanted lies on top: where both agree, its dashes still show.
     const pair = [['actual', [], true], ['wanted', [6, 4], true]];
+    const both = [['curve-1', [], false], ['curve-5', [5, 3], false]];
     this._plots = [
       this._plot(boxes[0], pair, around(STEPS_DEG), 'deg', false),
       this._plot(boxes[1], pair, around(STEPS_DEG), 'deg', false),
-      this._plot(boxes[2], [['curve-1', [], false], ['curve-5', [5, 3], false]], around(STEPS_ERROR), 'deg', false),
-      this._plot(boxes[3], wires.map(([name, dash]) => [name, dash, true]), upwards(STEPS_N), 'N', true),
+      this._plot(boxes[2], both, around(STEPS_ERROR), 'deg', false),
+      this._plot(boxes[3], both, around(STEPS_FORCE_N), 'N', false),
+      this._plot(boxes[4], wires.map(([name, dash]) => [name, dash, true]), upwards(STEPS_N), 'N', true),
     ];
     this._values = boxes.map((box) => [...box.querySelectorAll('[data-value]')]);
     this._sizes = new ResizeObserver(() => this._fit());
@@ -66,11 +75,11 @@ export class Plots {
   }
 
   /**
-   * Draw two of the four plots, in turn, as the history has them: in the 60 s that are shown, a fifteenth of a
+   * Draw two of the five plots, in turn, as the history has them: in the 60 s that are shown, a tenth of a
    * second is less than a pixel.
    */
   draw(history) {
-    const { wanted, actual, tensions } = this._places;
+    const { wanted, actual, tensions, force } = this._places;
     const newest = history.time.at(-1);
     if (newest === undefined) return;
     const [time] = history.window([]);
@@ -79,22 +88,25 @@ export class Plots {
       this._plots[k].setData([x, ...columns]);
       this._write(k, values);
     };
-    if (this._turn) {
+    if (this._turn === 0) {
       [0, 1].forEach((j) => {
         const both = [wanted[j], actual[j]];
         plot(j, history.window(both.toReversed()).slice(1), both.map((s) => history.last(s)));
       });
-    } else {
+    } else if (this._turn === 1) {
       const errors = [0, 1].map((j) => history.difference(wanted[j], actual[j]));
       plot(2, errors, errors.map((column) => column.at(-1)));
-      plot(3, history.window(tensions).slice(1), tensions.map((s) => history.last(s)));
+      const along = force.slice(0, 2);
+      plot(3, history.window(along, [2]).slice(1), along.map((s) => history.last(s)));
+    } else {
+      plot(4, history.window(tensions).slice(1), tensions.map((s) => history.last(s)));
     }
-    this._turn = !this._turn;
+    this._turn = (this._turn + 1) % 3;
   }
 
   _write(k, values) {
     this._values[k].forEach((element, i) => {
-      const text = values[i] === null || values[i] === undefined ? '–' : values[i].toFixed(1);
+      const text = values[i] === null || values[i] === undefined ? '–' : values[i].toFixed(k === FORCE ? 2 : 1);
       if (element.textContent !== text) element.textContent = text;
     });
   }

@@ -14,6 +14,8 @@ const WIRES = [
   { name: 'x+', along: [1, 0] }, { name: 'x−', along: [-1, 0] },
   { name: 'y+', along: [0, 1] }, { name: 'y−', along: [0, -1] },
 ];
+/** Length in m of an arrow of the force that gives an alarm, and the longest one. */
+const [PUSH, LONGEST_PUSH] = [0.007, 0.014];
 const FULL_TURN = 2 * Math.PI;
 
 const add = (a, b, s = 1) => [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]];
@@ -68,6 +70,15 @@ export function frames(line) {
   });
 }
 
+/** The arrow of a force at the end of a centre line, which ends at the tube: `{from, to, size, level}`, in m and N. */
+export function pushed(line, { force: [fx, fy], alarm, level }) {
+  const { point, x, y } = frames(line).at(-1);
+  const size = Math.hypot(fx, fy);
+  const along = unit(add([fx * x[0], fx * x[1], fx * x[2]], y, fy));
+  const to = add(point, along, -TUBE);
+  return { from: add(to, along, -Math.min((PUSH * size) / alarm, LONGEST_PUSH)), to, size, level };
+}
+
 /** Colour of a tension between none and its ceiling, from the colours of a scale `[r, g, b]`. */
 export function tensionColour(tension, ceiling, scale) {
   if (!Number.isFinite(tension)) return 'rgb(109 120 134)';
@@ -101,7 +112,10 @@ export class View3d {
     this._turnByHand();
   }
 
-  /** Draw `{wanted, actual}` in coordinates, `tensions` of the four wires in N and their `ceiling`. */
+  /**
+   * Draw `{wanted, actual}` in coordinates, `tensions` of the four wires in N and their `ceiling`, and what pushes
+   * the tip: `{force, alarm, level}`, `[x, y]` in the tip's frame in N or null, what gives an alarm in N, and the level of the one that stands.
+   */
   draw(scene) {
     this._last = scene;
     const { _ctx: ctx, _camera: camera } = this;
@@ -114,7 +128,11 @@ export class View3d {
     const wanted = points(scene.wanted);
     if (actual.length) this._shadow([base, ...actual]);
     if (wanted.length) this._wantedTube([base, ...wanted]);
+    const push = actual.length && scene.push.force ? pushed(actual, scene.push) : null;
+    const behind = push && dot(add(push.from, push.to, -1), this._camera.ahead) > 0;
+    if (behind) this._push(push);
     if (actual.length) this._actualTube([base, ...actual], scene.tensions, scene.ceiling);
+    if (push && !behind) this._push(push);
     if (wanted.length) this._wantedLine(wanted);
     this._numbers(scene.tensions, scene.ceiling);
   }
@@ -300,6 +318,42 @@ export class View3d {
     ctx.fill();
     ctx.strokeStyle = this._colour('actual');
     ctx.stroke();
+  }
+
+  /** An arrow that pushes the tip, with its size. */
+  _push({ from, to, size, level }) {
+    const { _ctx: ctx, _camera: camera } = this;
+    const [[x0, y0], [x1, y1]] = [camera.project(from), camera.project(to)];
+    const length = Math.hypot(x1 - x0, y1 - y0);
+    const [ux, uy] = length > 0 ? [(x1 - x0) / length, (y1 - y0) / length] : [0, 1];
+    const head = Math.min(12, 0.6 * length);
+    const [xh, yh] = [x1 - head * ux, y1 - head * uy];
+    ctx.lineCap = 'butt';
+    ctx.lineJoin = 'round';
+    for (const [colour, wider] of [[this._colour('background'), 4], [this._colour(level ? `alarm-${level}` : 'ink'), 0]]) {
+      ctx.strokeStyle = ctx.fillStyle = colour;
+      ctx.lineWidth = 4 + wider;
+      ctx.beginPath();
+      ctx.moveTo(x0, y0);
+      ctx.lineTo(xh, yh);
+      ctx.stroke();
+      ctx.beginPath();
+      ctx.moveTo(x1, y1);
+      ctx.lineTo(xh - 0.6 * head * uy, yh + 0.6 * head * ux);
+      ctx.lineTo(xh + 0.6 * head * uy, yh - 0.6 * head * ux);
+      ctx.closePath();
+      ctx.fill();
+      ctx.lineWidth = wider;
+      if (wider) ctx.stroke();
+    }
+    ctx.font = `600 13px ${this._colour('sans')}`;
+    ctx.textBaseline = 'middle';
+    ctx.textAlign = Math.abs(ux) < 0.5 ? 'center' : ux > 0 ? 'right' : 'left';
+    const words = [`${size.toFixed(2)} N`, x0 - 8 * ux, y0 - 14 * uy];
+    ctx.strokeStyle = this._colour('background');
+    ctx.lineWidth = 4;
+    ctx.strokeText(...words);
+    ctx.fillText(...words);
   }
 
   /** Tensions in numbers, beside where the wires leave the ground. */

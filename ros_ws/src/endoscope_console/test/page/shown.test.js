@@ -176,7 +176,7 @@ test('an axis has ticks at both ends, however low it is', () => {
 test('signals are found by the names in hello', () => {
   const signals = ['slave/servo_jp:bend_x', 'slave/measured_js:bend_x', 'slave/servo_jp:bend_y', 'wires/measured_js:wire_x_pos']
     .map((name) => ({ name, unit: name.startsWith('wires') ? 'N' : 'rad' }));
-  assert.deepEqual(places(signals), { wanted: [0, 2], actual: [1], tensions: [3] });
+  assert.deepEqual(places(signals), { wanted: [0, 2], actual: [1], tensions: [3], force: [], along: [] });
   assert.deepEqual(scalesOf(signals).map(Math.round), [57, 57, 57, 1]);
 });
 

@@ -1,6 +1,7 @@
 """From desired bending to shaft angles: whose commands are obeyed, and what goes out."""
 
 from enum import StrEnum
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -16,12 +17,15 @@ from endoscope_core.control import (
     Feedforward,
 )
 from endoscope_core.control.range_cut import RangeCut
+from endoscope_core.kinematics import tip_lever
 from endoscope_core.names import JOINTS, MOTOR_MEASURED, MOTORS, SLAVE_COMMAND
 from endoscope_core.rig import Rig
 from endoscope_core.safety import (
     AdoptionCode,
     CommandGate,
     CommandLimits,
+    ContactGuard,
+    GuardState,
     MotionLimits,
     MotionShaper,
     Refusal,
@@ -65,7 +69,8 @@ class CommandStream:
 
     Calibration goes before the master while its commands are fresh, and passes uncompensated.
     Every stream begins at the measured pose, and the shafts go on from where they are, whatever
-    changes: source, law or feedback. All times are local and monotonic, in ns, but for stamps.
+    changes: source, law or feedback. Against a force at the tip the master's commands go on as
+    `contact` lets them. All times are local and monotonic, in ns, but for stamps.
     """
 
     def __init__(self, rig: Rig, law: LawInForce) -> None:
@@ -80,6 +85,8 @@ class CommandStream:
         self.source = Commander.NOBODY
         self.corrected = False  # whether a correction is added
         self.cut = RangeCut()
+        tip, lever = rig.tip, partial(tip_lever, length=rig.instrument.section_length)
+        self.contact = ContactGuard(JOINTS, tip.force_limit, tip.contact_speed, lever)
         self._law, self._gear, self._resolution = law, facts.gear, shafts.resolution
         self._passing = Feedforward(len(JOINTS), law.feedforward.settings)
         self._desired = DesiredMotion(len(JOINTS))
@@ -93,13 +100,13 @@ class CommandStream:
         for gate in (self.gate, self.calibration_gate, self.correction_gate):
             gate.reset()
         self._corrections.restart()
-        self.source = Commander.NOBODY
+        self._end()
 
     def end_master(self) -> None:
         """The clutch was released: whatever is commanded after it begins at the measured pose."""
         self.gate.reset()
         if self.source is Commander.MASTER:
-            self.source = Commander.NOBODY
+            self._end()
 
     def correct(self, correction: Command, now_ns: int) -> None:
         """Take a correction, to be added to the master's commands after it."""
@@ -124,21 +131,26 @@ class CommandStream:
             return ()
         seconds, begins = step
         feedforward = self._law.feedforward
-        # This mode learns from the tracker itself.
-        learns = feedforward.law.mode == ADAPTIVE_PHYSICAL
-        correction = None if learns else self._corrections.before(command.stamp_ns)
-        added = np.zeros(len(JOINTS)) if correction is None else correction
         if begins:
             self._desired.restart()
+            self.contact.begin(measured.bending or command.position, now_ns)
+        position, velocity = self.contact(command.position, command.velocity, seconds, now_ns)
+        # A correction would push on for what the guard holds back.
+        yields = self.contact.state is GuardState.YIELDING
+        # This mode learns from the tracker itself.
+        learns = feedforward.law.mode == ADAPTIVE_PHYSICAL
+        correction = None if learns or yields else self._corrections.before(command.stamp_ns)
+        added = np.zeros(len(JOINTS)) if correction is None else correction
         if begins or self.corrected != (correction is not None):
             self.corrected = correction is not None
-            feedforward.rebase(self._drive_before() - added, command.position if begins else None)
+            feedforward.rebase(self._drive_before() - added, position if begins else None)
         # Cut where the tube at hand lets the tip bend no more.
-        self._angle, velocity = self.cut(self._law.ranges, command.position, command.velocity)
+        self._angle, velocity = self.cut(self._law.ranges, position, velocity)
         angle, velocity = self._desired.follow(self._angle, velocity, seconds)
         if not any(velocity):
             self._law.take_pending()
-        self._learn(command.stamp_ns, measured)
+        if not yields:
+            self._learn(command.stamp_ns, measured)
         drive = feedforward.step(angle, velocity, seconds) + added
         return self._put_out(drive, seconds, now_ns)
 
@@ -152,6 +164,7 @@ class CommandStream:
         if step is None:
             return ()
         seconds, begins = step
+        self.contact.end()
         if begins:
             self._passing.rebase(self._drive_before(), command.position)
         drive = self._passing.step(command.position, command.velocity or _AT_ZERO, seconds)
@@ -160,13 +173,14 @@ class CommandStream:
     def watch(self, now_ns: int, measured: Measured, held: bool) -> str:
         """Notice streams that have ended; why the motion session must end, or nothing."""
         reason = ''
+        self.contact.look(now_ns)
         if self.source is Commander.MASTER and not self.gate.is_fresh(now_ns):
-            self.source = Commander.NOBODY
+            self._end()
             if held:
                 refused = f' ({self.gate.last_reason})' if self.gate.last_reason else ''
                 reason = f'{SLAVE_COMMAND} ended while the clutch was held{refused}'
         elif self.source is Commander.CALIBRATION and not self.calibration_gate.is_fresh(now_ns):
-            self.source = Commander.NOBODY
+            self._end()
         if self.source is Commander.NOBODY:
             self._law.take_pending()
             return reason
@@ -213,6 +227,11 @@ class CommandStream:
         self.shaper.restart(self._sent)
         self._answer.restart()
         return _FIRST_PERIOD_S, True
+
+    def _end(self) -> None:
+        """Nobody's commands are obeyed; what comes next begins at the measured pose."""
+        self.source = Commander.NOBODY
+        self.contact.end()
 
     def _learn(self, stamp_ns: int, measured: Measured) -> None:
         """Give a measurement from before this command to the law, once."""

@@ -103,6 +103,16 @@ class TensionFacts:
 
 
 @dataclass(frozen=True)
+class TipFacts:
+    """Force on the tip across its axis, in N, and what is done about it."""
+
+    force_limit: Annotated[float, within(0.001, 100.0)]  # above which the guard acts
+    # Largest speed in m/s at which the tip goes on against a force above the limit.
+    contact_speed: Annotated[float, within(1e-5, 1.0)]
+    force_alarm: Annotated[float, within(0.001, 100.0)]  # at which the console sounds an alarm
+
+
+@dataclass(frozen=True)
 class HandleFacts:
     """The operator's handle, in rad."""
 
@@ -147,6 +157,7 @@ class Rig:
     motors: MotorFacts
     timeouts: Timeouts
     tension: TensionFacts
+    tip: TipFacts
     handle: HandleFacts
     instrument: InstrumentFacts
     devices: DeviceFacts

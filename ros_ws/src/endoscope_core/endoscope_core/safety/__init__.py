@@ -3,6 +3,7 @@
 from endoscope_core.safety.adoption_code import AdoptionCode
 from endoscope_core.safety.bending_range import BendingRange, keep_within, ranges_in_words
 from endoscope_core.safety.command_gate import CommandGate, CommandLimits, Refusal
+from endoscope_core.safety.contact_guard import ContactGuard, FeltForce, GuardState
 from endoscope_core.safety.guards import StandingStill, TensionGuard
 from endoscope_core.safety.motion_session import MotionSession
 from endoscope_core.safety.motion_shaper import MotionLimits, MotionShaper
@@ -20,6 +21,9 @@ __all__ = [
     'BendingRange',
     'CommandGate',
     'CommandLimits',
+    'ContactGuard',
+    'FeltForce',
+    'GuardState',
     'MotionLimits',
     'MotionSession',
     'MotionShaper',

@@ -1,12 +1,16 @@
 """Turns desired bending into motor commands that make up for the hysteresis."""
 
+from collections.abc import Callable
+
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.parameter import Parameter
+from rclpy.subscription import Subscription
 
 from endoscope_core.compensation.command_stream import Command, CommandStream, Measured
 from endoscope_core.compensation.law_in_force import LawInForce, Selection
 from endoscope_core.control import AdoptedPlant, Feedforward, FeedforwardSettings, MotorLimits
 from endoscope_core.identification.law_choice import LawChoice
+from endoscope_core.safety import FeltForce, GuardState
 from endoscope_nodes import names
 from endoscope_nodes.client.calibration_result import findings_of, is_of_no_class
 from endoscope_nodes.nodes.plant_adoption import PlantAdoption
@@ -14,8 +18,8 @@ from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report, diagnos
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
 from endoscope_nodes.runtime.node_parameters import FOR_SESSION, CompensatorParameters
-from endoscope_nodes.runtime.qos import COMMAND, RESULT
-from endoscope_nodes.runtime.streams import JointPublisher, JointSample
+from endoscope_nodes.runtime.qos import COMMAND, RESULT, SENSOR_ASKED
+from endoscope_nodes.runtime.streams import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.safety.sessions import TURN_S, ClutchWatch, SessionWatch
 from endoscope_nodes.safety.streams import CommandReport
 
@@ -25,7 +29,8 @@ class CompensatorNode(EndoscopeNode):
 
     It obeys commands and corrections of the motion session that it takes part in, each from one
     sender; see :class:`CommandStream` and :class:`LawInForce`.  A master that falls silent while
-    the clutch is held ends the session.
+    the clutch is held ends the session.  What pushes at the tip, by ``tip_force/bounds``, is
+    approached slowly; see :class:`ContactGuard`.
     """
 
     def __init__(self, context: NodeContext) -> None:
@@ -54,6 +59,9 @@ class CompensatorNode(EndoscopeNode):
         commands(names.SLAVE_COMMAND, stream.gate, self._on_master, obeys=True)
         commands(names.CORRECTION, stream.correction_gate, self._on_correction)
         self._session.results(names.CALIBRATION_RESULT, self._on_result, self._doubt_results)
+        self._session.one_sender(self._bounds, self._on_bounds)
+        self._guard_reported: tuple[object, ...] = ()
+        self._guard_since_ns = 0
         self._adoption = PlantAdoption(
             self, self._session, self.law, self._check_rest, self._reselect
         )
@@ -62,6 +70,7 @@ class CompensatorNode(EndoscopeNode):
         add('calibration commands', CommandReport(stream.calibration_gate, self.ticker))
         add('corrections', CommandReport(stream.correction_gate, self.ticker))
         add('output', self._report)
+        add('guard', self._report_guard)
         self.ticker.every(TURN_S, self._watch_motion)
         self.ticker.every(0.1, self._publish_state)
 
@@ -105,6 +114,41 @@ class CompensatorNode(EndoscopeNode):
     def _on_correction(self, sample: JointSample) -> None:
         self.stream.correct(_command(sample), self.ticker.monotonic_ns())
 
+    def _bounds(self, receive: Callable[[JointSample], None]) -> Subscription:
+        topic, asked = names.TIP_FORCE_BOUNDS, SENSOR_ASKED
+        stream = JointSubscription(self, topic, names.BOUNDS, receive, asked, exact=True)
+        return stream.subscription
+
+    def _on_bounds(self, sample: JointSample) -> None:
+        if not sample.effort:
+            return
+        x, y, low_x, low_y, high_x, high_y, seen = sample.effort
+        age_ns = max(0, self.ticker.now_ns() - sample.stamp_ns)
+        felt_ns = self.ticker.monotonic_ns() - age_ns
+        felt = FeltForce(felt_ns, (x, y), (low_x, low_y), (high_x, high_y), seen == 1.0)
+        self.stream.contact.feel(felt)
+        self._look_at_guard()
+
+    def _look_at_guard(self) -> None:
+        """Report at once how the guard's state has changed, if it has."""
+        guard = self.stream.contact
+        yields = guard.state is GuardState.YIELDING
+        state = (guard.state, guard.reason, guard.joints if yields else ())
+        if state != self._guard_reported:
+            self._guard_reported, self._guard_since_ns = state, self.ticker.now_ns()
+            self.diagnostics.publish()
+
+    def _report_guard(self) -> Report:
+        guard = self.stream.contact
+        values: dict[str, object] = {
+            'state': guard.state,
+            'limit [N]': guard.limit,
+            'joints': ' '.join(guard.joints),
+            'since': f'{self._guard_since_ns * 1e-9:.3f}',
+        }
+        level = WARN if guard.state is GuardState.YIELDING else OK
+        return level, guard.in_words(), values
+
     def _put_out(self, sample: JointSample, shafts: tuple[float, ...]) -> bool:
         if shafts:
             self._motors.publish(sample.stamp_ns, *shafts)
@@ -113,6 +157,7 @@ class CompensatorNode(EndoscopeNode):
     def _watch_motion(self) -> None:
         now, held = self.ticker.monotonic_ns(), self._clutch.held
         reason = self.stream.watch(now, self._measured, held)
+        self._look_at_guard()
         if reason:
             self._session.leave(reason)
 

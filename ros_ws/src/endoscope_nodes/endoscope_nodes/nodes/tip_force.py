@@ -25,6 +25,7 @@ from endoscope_nodes.runtime.joint_readings import JointReadings, RigReadings
 from endoscope_nodes.runtime.node_context import NodeContext, adopted_plant
 from endoscope_nodes.runtime.node_parameters import TipForceParameters
 from endoscope_nodes.runtime.qos import RESULT, SENSOR_OFFERED
+from endoscope_nodes.runtime.streams import JointPublisher
 
 _SECOND = 1_000_000_000
 _CALIBRATE = 'calibrate'
@@ -66,6 +67,9 @@ class TipForceNode(EndoscopeNode):
             ),
         }
         self._forces = self.create_publisher(WrenchStamped, names.TIP_FORCE, SENSOR_OFFERED)
+        self._bounds = JointPublisher(
+            self, names.TIP_FORCE_BOUNDS, names.BOUNDS, ('effort',), SENSOR_OFFERED
+        )
         self.create_subscription(DiagnosticArray, names.COMPENSATOR_PLANT, self._on_plant, RESULT)
         self.create_subscription(
             DiagnosticArray, names.CALIBRATION_FEEDBACK, self._on_feedback, RESULT
@@ -125,6 +129,8 @@ class TipForceNode(EndoscopeNode):
         message.wrench.force.x, message.wrench.force.y = force.force.tolist()
         message.wrench.force.z = math.nan
         self._forces.publish(message)
+        bounds = (*force.force, *force.low, *force.high, force.seen)
+        self._bounds.publish(stamp_ns, *map(float, bounds))
         self._published += 1
         if changed:
             self.diagnostics.publish()
