@@ -145,7 +145,8 @@ class _Joint:
         if len(self._last) == LASTING:
             last = self._last[-1]
             # By how much zero is outside of the set; negative within it.
-            self.free.learn(max(last.low, -last.high), self.lasting)
+            half = 0.5 * (last.high - last.low)
+            self.free.learn(max(last.low, -last.high), self.lasting, half)
 
 
 class TipForceEstimator:
@@ -175,7 +176,7 @@ class TipForceEstimator:
         self.tracker = Samples(count)
         self._streams = {'motors': self.motor, 'load cells': self.wires, 'tracker': self.tracker}
         self._joints: list[_Joint] = []
-        self._free_motion = [FreeMotion() for _ in self._parameters]
+        self.free_motion = [FreeMotion() for _ in self._parameters]
         self._end = math.nan
         self._free = False
         self.state = State.NO_SAMPLES
@@ -190,7 +191,7 @@ class TipForceEstimator:
     @free.setter
     def free(self, free: bool) -> None:
         if free and not self._free:
-            for each in self._free_motion:
+            for each in self.free_motion:
                 each.forget()
         self._free = free
 
@@ -244,7 +245,7 @@ class TipForceEstimator:
         for j, (p, on) in enumerate(zip(self._parameters, self._on, strict=True)):
             delay_s = float(p[TRACKER_DELAY.first_parameter]) if on[TRACKER_DELAY.flag] else 0.0
             observer = ExternalMoment(p, on, float(shafts[j]))
-            self._joints.append(_Joint(observer, delay_s, self._free_motion[j]))
+            self._joints.append(_Joint(observer, delay_s, self.free_motion[j]))
         self._end = first
         return True
 
@@ -284,7 +285,7 @@ class TipForceEstimator:
         if not all(joint.memory_is_known for joint in self._joints):
             self.state = State.UNKNOWN_MEMORY
             return None
-        known = not any(math.isnan(each.bound) for each in self._free_motion)
+        known = not any(math.isnan(each.bound) for each in self.free_motion)
         goes_on = known and not any(j.is_touched or j.free.is_learnt for j in self._joints)
         if self._free or goes_on:
             for joint in self._joints:

@@ -13,6 +13,9 @@ FALSE_ALARM_S = 20.0 * 3600.0
 """Of motion in free space, in which one block may show as much as a force that is seen."""
 TAIL = 0.1
 """Share of free motion that shows how rare larger misfits are."""
+PRIOR_EXCESS, PRIOR_CLUSTERS = 0.09, 4.0
+"""Mean excess over the level of that tail, in half-widths of a joint's set, and after how many
+clusters a rig's own counts as much: by `endoscope bench touch --derive`, over rigs."""
 LEAST = 100
 """Blocks of free motion, 2.5 s, from which bounds are known: ten in the tail."""
 MOST = 24_000
@@ -36,6 +39,7 @@ class FreeMotion:
         self.bound = self.least_seen = math.nan
         self._misfits: list[float] = []
         self._lasting: list[float] = []
+        self._halves: list[float] = []
 
     @property
     def is_learnt(self) -> bool:
@@ -44,12 +48,16 @@ class FreeMotion:
 
     def forget(self) -> None:
         """Begin anew; bounds stay until there are others."""
-        self._misfits, self._lasting = [], []
+        self._misfits, self._lasting, self._halves = [], [], []
 
-    def learn(self, misfit: float, lasting: float) -> None:
-        """Add a block by how much zero is outside of its set, and of all of the last ones, N m."""
+    def learn(self, misfit: float, lasting: float, half: float) -> None:
+        """Add a block by how much zero is outside of its set, and of all of the last ones, N m.
+
+        `half` is the half-width of the set.
+        """
         self._misfits.append(misfit)
         self._lasting.append(lasting)
+        self._halves.append(half)
         count = len(self._misfits)
         if count == LEAST or (count > LEAST and count % _DERIVED == 0):
             self._derive()
@@ -57,17 +65,24 @@ class FreeMotion:
     def _derive(self) -> None:
         ordered = np.sort(self._misfits)
         self.bound = max(0.0, float(ordered[round(COVERED * len(ordered))]))
+        level, excess, clusters, half = self.tail()
         # What exceeds a high level does so by an exponentially distributed amount (Pickands, Ann.
         # Statist. 3(1), 1975, of a light tail), in clusters of which each counts once (Leadbetter,
-        # Stat. Probab. Lett. 12, 1991). Of `n` clusters no more than that is known of the mean m:
-        # the next excess is beyond n m (p^(-1/n) - 1) with a chance of p (Geisser, Predictive
-        # Inference, 1993).
+        # Stat. Probab. Lett. 12, 1991). With the conjugate prior for its mean, as if `n` clusters
+        # with a sum of `s` had been seen, the next excess is beyond s (p^(-1/n) - 1) with a chance
+        # of p (Geisser, Predictive Inference, 1993).
+        n = clusters + PRIOR_CLUSTERS
+        seen = clusters * excess + PRIOR_CLUSTERS * PRIOR_EXCESS * half
+        rarity = math.log(TAIL * FALSE_ALARM_S / BLOCK_S)
+        self.least_seen = max(0.0, level + seen * math.expm1(rarity / n))
+
+    def tail(self) -> tuple[float, float, int, float]:
+        """Level of the tail, mean excess over it, clusters, and median half-width; N m."""
         lasting = np.array(self._lasting)
         ordered = np.sort(lasting)
         begin = round((1.0 - TAIL) * len(ordered))
-        level, tail = float(ordered[begin - 1]), ordered[begin:]
+        level = float(ordered[begin - 1])
         above = np.concatenate([[False], lasting > level])
         clusters = max(1, int(np.sum(above[1:] & ~above[:-1])))
-        excess = float(np.mean(tail)) - level
-        rarity = math.log(TAIL * FALSE_ALARM_S / BLOCK_S)
-        self.least_seen = max(0.0, level + clusters * excess * math.expm1(rarity / clusters))
+        excess = float(np.mean(ordered[begin:])) - level
+        return level, excess, clusters, float(np.median(self._halves))
