@@ -25,9 +25,10 @@ class Bench:
         self.now_ns, self.sent = 1_000 * MS, 0.0
         self.guard.begin((0.0, 0.0), self.now_ns)
 
-    def feel(self, force, half_width=0.02, seen=True):
+    def feel(self, force, half_width=0.02, seen=True, age_ms=0):
         low, high = force - half_width, force + half_width
-        self.guard.feel(FeltForce(self.now_ns, (force, NAN), (low, NAN), (high, NAN), seen))
+        felt = FeltForce(self.now_ns - age_ms * MS, (force, NAN), (low, NAN), (high, NAN), seen)
+        self.guard.feel(felt, self.now_ns)
 
     def go(self, *targets):
         """What is sent for the last of the targets, one a millisecond."""
@@ -152,6 +153,25 @@ def test_a_force_that_is_not_certain_or_below_the_limit_is_only_watched():
     assert bench.guard.state is not GuardState.YIELDING
 
 
+def test_a_force_that_rises_is_taken_for_what_it_is_by_now():
+    bench = Bench()
+    for force in (0.0, 0.0, 0.0, 0.0, -0.02, -0.04, -0.03):
+        bench.feel(force, half_width=0.01, age_ms=100)
+        assert bench.guard.state is GuardState.WATCHING, force
+        bench.wait(25)
+    bench.feel(-0.06, half_width=0.01, age_ms=100)
+    # In 100 ms 0.06 N more, and as much again since.
+    assert bench.guard.in_words().startswith('yielding: bend_x pushes with 0.12 N')
+
+
+def test_one_step_of_the_estimate_is_no_rate():
+    bench = Bench()
+    bench.feel(0.0, age_ms=100)
+    bench.wait(25)
+    bench.feel(-0.06, age_ms=100)
+    assert bench.guard.state is GuardState.WATCHING
+
+
 def test_it_has_to_know_where_a_stream_begins():
     guard = ContactGuard(('bend_x', 'bend_y'), LIMIT, SPEED, lambda _: LEVER)
     with pytest.raises(RuntimeError, match='begin first'):
@@ -184,14 +204,21 @@ class AnyHand(RuleBasedStateMachine):
         self.guard.end()
         self.sent = None
 
-    @rule(force=FORCES, half_width=st.floats(-0.01, 0.4), seen=st.booleans())
-    def feel(self, force, half_width, seen):
+    @rule(
+        force=FORCES,
+        half_width=st.floats(-0.01, 0.4),
+        seen=st.booleans(),
+        age_ms=st.integers(0, 400),
+    )
+    def feel(self, force, half_width, seen, age_ms):
         both = (force, -force)
         low, high = (tuple(f + w for f in both) for w in (-half_width, half_width))
-        self.guard.feel(FeltForce(self.now_ns, both, low, high, seen))
+        age_ns = age_ms * MS
+        felt = FeltForce(self.now_ns - age_ns, both, low, high, seen)
+        self.guard.feel(felt, self.now_ns)
         certain = seen and abs(force) - half_width > 0.0 and LIMIT < abs(force) < math.inf
         sign = math.copysign(1.0, force)
-        self.felt_ns = self.now_ns
+        self.felt_ns = self.now_ns - age_ns
         self.pushed = (sign, -sign) if certain and half_width >= 0.0 else ()
 
     @rule(ms=st.integers(0, 500))
