@@ -132,6 +132,15 @@ def test_without_an_estimate_it_yields_until_the_hand_turns_back_and_is_off_then
     assert bench.guard.in_words() == 'off: the force is silent'
 
 
+def test_a_hand_that_rests_when_the_estimate_falls_silent_has_not_turned_back():
+    bench = Bench()
+    bench.go(*ramp(0.0, 0.5))
+    bench.feel(-0.2)
+    bench.wait(SILENT_NS // MS + 1)
+    bench.go(*[0.5] * 10)
+    assert bench.guard.state is GuardState.YIELDING
+
+
 @pytest.mark.parametrize(('force', 'held'), [(-0.2, True), (-0.05, False)])
 def test_a_new_stream_owes_nothing_and_keeps_the_direction_that_is_pushed(force, held):
     bench = Bench()
@@ -161,6 +170,14 @@ def test_a_force_that_rises_is_taken_for_what_it_is_by_now():
         bench.wait(25)
     bench.feel(-0.06, half_width=0.01, age_ms=100)
     # In 100 ms 0.06 N more, and as much again since.
+    assert bench.guard.in_words().startswith('yielding: bend_x pushes with 0.12 N')
+
+
+def test_a_force_that_falls_is_taken_for_what_was_measured():
+    bench = Bench()
+    for force in (-0.3, -0.3, -0.3, -0.12):
+        bench.feel(force, age_ms=100)
+        bench.wait(25)
     assert bench.guard.in_words().startswith('yielding: bend_x pushes with 0.12 N')
 
 

@@ -62,8 +62,8 @@ class Push:
     without: float  # largest force without the guard
     guarded: float  # and with it
     at_end: float  # with it, when the hand has held for 1.5 s
-    # From touching until the guard yields, s; infinite where it does not, and negative where it
-    # yields before.
+    # From touching until the guard yields, s; infinite where it does not, negative where it yields
+    # before, and NaN where it has nothing to yield to.
     late: float
     when_yielding: float  # force then; the largest where it does not yield
 
