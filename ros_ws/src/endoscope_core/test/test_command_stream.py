@@ -49,7 +49,7 @@ class Slave:
     def feel(self, force):
         """Have a force on the first joint that is certain, in N."""
         low, high = (force - 0.02, 0.0), (force + 0.02, 0.0)
-        self.stream.contact.feel(FeltForce(self.now_ns, (force, 0.0), low, high, True), self.now_ns)
+        self.stream.contact.feel(FeltForce(self.now_ns, (force, 0.0), low, high, True))
 
     def watch(self, pause_ms=0):
         self.now_ns += pause_ms * MS

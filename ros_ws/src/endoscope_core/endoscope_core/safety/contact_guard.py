@@ -1,7 +1,6 @@
 """Guard of the force at the tip: what pushes too hard is approached slowly, and left freely."""
 
 import math
-from collections import deque
 from collections.abc import Callable, Sequence
 from enum import StrEnum
 from typing import NamedTuple
@@ -9,8 +8,6 @@ from typing import NamedTuple
 SILENT_NS = 350_000_000
 """Age of an estimate from which nothing is known: an estimate is 0.1 s late, and ten of them, 40 a
 second, are missed."""
-RATE_NS = 100_000_000
-"""Time over which the rate of a force is taken: as long as it is foreseen for."""
 
 
 class GuardState(StrEnum):
@@ -61,9 +58,8 @@ class _Joint:
 
     def __init__(self) -> None:
         self.sides = _Side(1.0), _Side(-1.0)
-        self.force = 0.0  # by now, N
+        self.force = 0.0
         self.known_ns: int | None = None
-        self._felt: deque[tuple[int, float]] = deque()  # times and forces of the last 0.1 s
         self.towards = 0.0  # sign of the motion against a force above the limit
 
     @property
@@ -73,14 +69,13 @@ class _Joint:
     def is_known(self, now_ns: int) -> bool:
         return self.known_ns is not None and now_ns - self.known_ns <= SILENT_NS
 
-    def feel(self, felt: FeltForce, j: int, limit: float, target: float, age_ns: int) -> None:
+    def feel(self, felt: FeltForce, j: int, limit: float, target: float) -> None:
         force, low, high = felt.force[j], felt.low[j], felt.high[j]
         if not (math.isfinite(force) and low <= high):
             return
         certain = low > 0.0 or high < 0.0
         if not certain and 0.5 * (high - low) > limit:
             return  # a force at the limit would be hidden
-        force = self._by_now(felt.time_ns, force, age_ns)
         self.known_ns, self.force = felt.time_ns, force
         self.towards = -math.copysign(1.0, force) if abs(force) > limit else 0.0
         if certain and felt.seen:
@@ -88,29 +83,16 @@ class _Joint:
                 if side.sign == self.towards:
                     side.begin(target)
 
-    def _by_now(self, time_ns: int, force: float, age_ns: int) -> float:
-        """What a force that rises has risen to since an estimate, at the rate that it had."""
-        felt = self._felt
-        while felt and not 0 < time_ns - felt[0][0] <= RATE_NS:
-            felt.popleft()
-        since_ns, before = felt[0] if felt else (time_ns, force)
-        felt.append((time_ns, force))
-        took_ns = time_ns - since_ns
-        # One step of the estimate is no rate.
-        risen = (force - before) * age_ns / took_ns if 2 * took_ns >= RATE_NS else 0.0
-        return force + risen if risen * force > 0.0 else force
-
 
 class ContactGuard:
     """Slows a motion of J joints against a force above a limit; it never moves by itself.
 
-    A joint yields from an estimate above `limit` in N whose bounds exclude that nothing pushes; one
-    that rises is taken for what it has risen to by now. As long as it does, motion with the force
-    passes. Against it the joint follows at no more than `speed` in m/s of the tip: above the limit
-    only while the target moves on, below it until it is there. It ends once the force is below the
-    limit and the target no longer ahead, so that the slave does not leap when an obstacle gives
-    way; without any estimate, once the target turns back. Otherwise all passes unchanged. Times are
-    monotonic, in ns.
+    A joint yields from an estimate above `limit` in N whose bounds exclude that nothing pushes. As
+    long as it does, motion with the force passes. Against it the joint follows at no more than
+    `speed` in m/s of the tip: above the limit only while the target moves on, below it until it is
+    there. It ends once the force is below the limit and the target no longer ahead, so that the
+    slave does not leap when an obstacle gives way; without any estimate, once the target turns
+    back. Otherwise all passes unchanged. Times are monotonic, in ns.
 
     `lever` gives the way of the tip in m for a radian at angles (J,) in rad.
     """
@@ -128,11 +110,11 @@ class ContactGuard:
         self._asked: tuple[float, ...] = (0.0,) * len(self._names)
         self._now_ns = self._felt_ns = 0
 
-    def feel(self, felt: FeltForce, now_ns: int) -> None:
+    def feel(self, felt: FeltForce) -> None:
         """Take an estimate of the force."""
         self._felt_ns = felt.time_ns
         for j, joint in enumerate(self._joints):
-            joint.feel(felt, j, self.limit, self._asked[j], max(0, now_ns - felt.time_ns))
+            joint.feel(felt, j, self.limit, self._asked[j])
 
     def begin(self, angle: Sequence[float], now_ns: int) -> None:
         """A stream of commands begins at angles (J,) in rad."""

@@ -121,11 +121,10 @@ class _Compensator:
     def yields(self) -> bool:
         return self._stream.contact.state is GuardState.YIELDING
 
-    def feel(self, force: TipForce, begin: int) -> None:
-        """Take an estimate that is known by the command of that number."""
+    def feel(self, force: TipForce) -> None:
         force_n, low, high = (tuple(x.tolist()) for x in (force.force, force.low, force.high))
         felt = FeltForce(round(force.time * 1e9), force_n, low, high, force.seen)
-        self._stream.contact.feel(felt, self._origin_ns + begin * _NS_PER_TICK)
+        self._stream.contact.feel(felt)
 
     def block(self, begin: int) -> Array:
         """Shaft angles (BLOCK_TICKS, J) in rad for commands of the hand from one on."""
@@ -173,7 +172,7 @@ def _guarded(ready: Prepared, hand: _Hand, free: Array, seed: int) -> tuple[Arra
     for begin in begins:
         # As in the graph: what came is worked out beside it, and known a block later.
         for force in felt:
-            compensator.feel(force, begin)
+            compensator.feel(force)
         end = begin + BLOCK_TICKS
         sent[begin:end] = compensator.block(begin)
         if begin * TICK >= hand.begin and yielded == math.inf and compensator.yields:

@@ -126,7 +126,7 @@ class CompensatorNode(EndoscopeNode):
         age_ns = max(0, self.ticker.now_ns() - sample.stamp_ns)
         felt_ns = self.ticker.monotonic_ns() - age_ns
         felt = FeltForce(felt_ns, (x, y), (low_x, low_y), (high_x, high_y), seen == 1.0)
-        self.stream.contact.feel(felt, felt_ns + age_ns)
+        self.stream.contact.feel(felt)
         self._look_at_guard()
 
     def _look_at_guard(self) -> None:
