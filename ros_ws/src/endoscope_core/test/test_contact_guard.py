@@ -27,7 +27,8 @@ class Bench:
 
     def feel(self, force, half_width=0.02, seen=True):
         low, high = force - half_width, force + half_width
-        self.guard.feel(FeltForce(self.now_ns, (force, NAN), (low, NAN), (high, NAN), seen))
+        felt = FeltForce(self.now_ns, (force, NAN), (low, NAN), (high, NAN), seen)
+        self.guard.feel(felt)
 
     def go(self, *targets):
         """What is sent for the last of the targets, one a millisecond."""
@@ -131,6 +132,15 @@ def test_without_an_estimate_it_yields_until_the_hand_turns_back_and_is_off_then
     assert bench.guard.in_words() == 'off: the force is silent'
 
 
+def test_a_hand_that_rests_when_the_estimate_falls_silent_has_not_turned_back():
+    bench = Bench()
+    bench.go(*ramp(0.0, 0.5))
+    bench.feel(-0.2)
+    bench.wait(SILENT_NS // MS + 1)
+    bench.go(*[0.5] * 10)
+    assert bench.guard.state is GuardState.YIELDING
+
+
 @pytest.mark.parametrize(('force', 'held'), [(-0.2, True), (-0.05, False)])
 def test_a_new_stream_owes_nothing_and_keeps_the_direction_that_is_pushed(force, held):
     bench = Bench()
@@ -184,14 +194,21 @@ class AnyHand(RuleBasedStateMachine):
         self.guard.end()
         self.sent = None
 
-    @rule(force=FORCES, half_width=st.floats(-0.01, 0.4), seen=st.booleans())
-    def feel(self, force, half_width, seen):
+    @rule(
+        force=FORCES,
+        half_width=st.floats(-0.01, 0.4),
+        seen=st.booleans(),
+        age_ms=st.integers(0, 400),
+    )
+    def feel(self, force, half_width, seen, age_ms):
         both = (force, -force)
         low, high = (tuple(f + w for f in both) for w in (-half_width, half_width))
-        self.guard.feel(FeltForce(self.now_ns, both, low, high, seen))
+        age_ns = age_ms * MS
+        felt = FeltForce(self.now_ns - age_ns, both, low, high, seen)
+        self.guard.feel(felt)
         certain = seen and abs(force) - half_width > 0.0 and LIMIT < abs(force) < math.inf
         sign = math.copysign(1.0, force)
-        self.felt_ns = self.now_ns
+        self.felt_ns = self.now_ns - age_ns
         self.pushed = (sign, -sign) if certain and half_width >= 0.0 else ()
 
     @rule(ms=st.integers(0, 500))

@@ -211,11 +211,15 @@ BENCHES: dict[str, Bench] = {
         'the force beyond the bound that friction sets, over the largest force, how often the '
         'stated bounds hold the true force, and how many contacts of twice the visible force are '
         'reported within 0.3 s. Then teleoperates rigs in free space, 10 min each, and prints the '
-        'false alarms. Seeds 1 to 999 are for development.',
+        'false alarms. With --push, has a hand push each rig into its obstacle and not let go '
+        'instead, through the stream of commands of the compensator, and prints the largest force '
+        'with the guard of the tip beside that without. Seeds 1 to 999 are for development.',
         (
             _seeds('seeds of rigs that touch something (1-3)'),
             _seeds('seeds of rigs in free space (1-2)', '--free', last=2),
             _flag('--visible', 'print instead what is seen by the bend of tube and tip'),
+            _flag('--derive', 'print instead what free motion leaves over rigs'),
+            _option('--push', 'seeds of rigs that are pushed', type=seeds, metavar='A-B'),
             _file('--json', 'file for all rows; cases in it are skipped'),
             _jobs(),
         ),

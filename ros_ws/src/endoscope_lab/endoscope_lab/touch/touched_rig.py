@@ -40,7 +40,7 @@ class Touched:
     true: Array  # (N, J), N across the tip
 
 
-class _Rig:
+class DrawnRig:
     """A drawn rig: its description, its truth, and what it answers to a motion."""
 
     def __init__(self, generator: np.random.Generator, simulator: str) -> None:
@@ -68,8 +68,8 @@ class _Rig:
         names, sensors = self.true.joint_names(), self.true.sensors
         return readings.as_sensed(clean, names, sensors, seed), clean.bending
 
-    def moment(self, obstacle: 'Obstacle', bending: Array) -> Array:
-        """Moments (M, J) in N m that the obstacle exerts at true angles (M, J) in rad."""
+    def forces(self, obstacle: 'Obstacle', bending: Array) -> Array:
+        """Forces (M, J) in N across the tip that the obstacle exerts at true angles (M, J)."""
         moments = np.zeros_like(bending)
         q = bending[:, obstacle.joint]
         if self._other:
@@ -80,7 +80,8 @@ class _Rig:
             side = math.copysign(1.0, obstacle.angle)
             deep = np.maximum(0.0, side * (q - obstacle.angle))
             moments[:, obstacle.joint] = -side * obstacle.stiffness * deep
-        return moments
+        length = shipped_rig().instrument.section_length
+        return moments / np.array([tip_lever(angles, length) for angles in bending])[:, None]
 
 
 @dataclass(frozen=True)
@@ -91,40 +92,62 @@ class Obstacle:
     angle: float  # where, rad
     stiffness: float  # N m/rad
 
+    @property
+    def across(self) -> float:
+        """Its stiffness across the tip in N/m."""
+        return (
+            self.stiffness / tip_lever([self.angle], shipped_rig().instrument.section_length) ** 2
+        )
+
     def effect(self, plant: PlantDescription) -> EffectSpec:
         values = {'angle_rad': self.angle, 'stiffness': self.stiffness}
         return EffectSpec('contact', plant.joint_names()[self.joint], values)
 
 
-def touched(simulator: str, seed: int, obstacle: bool = True, seconds: float = 30.0) -> Touched:
-    """Identify a drawn rig, learn its bounds in free teleoperation, and have it touch something."""
+@dataclass
+class Prepared:
+    """A drawn rig whose plant is identified, and whose bounds are learnt in free space."""
+
+    generator: np.random.Generator
+    rig: DrawnRig
+    plant: PlantDescription
+    estimator: TipForceEstimator
+    later: float  # s: later than all before by more than any gap, so the memory is found again
+
+
+def prepared(simulator: str, seed: int) -> Prepared:
+    """Identify a drawn rig, and learn its bounds in free teleoperation."""
     generator = np.random.default_rng([seed, SIMULATORS.index(simulator)])
-    rig = _Rig(generator, simulator)
+    rig = DrawnRig(generator, simulator)
     count = len(rig.true.joints)
     known, _ = rig.record(motions.commissioning(generator, count), seed)
     plant = identified(known, rig.described)
     estimator = TipForceEstimator(plant, shipped_rig().instrument.section_length)
-    gear = shipped_rig().joints.gear
     free = motions.teleoperation(generator, count)
     estimator.free = True
     watched(estimator, rig.record(compensated(plant, free), seed + 1)[0], 0.0)
     estimator.free = False
+    return Prepared(generator, rig, plant, estimator, known.duration + motions.HAND_S)
+
+
+def touched(simulator: str, seed: int, obstacle: bool = True, seconds: float = 30.0) -> Touched:
+    """Have a prepared rig touch something in teleoperation."""
+    ready = prepared(simulator, seed)
+    generator, rig, estimator = ready.generator, ready.rig, ready.estimator
     asked = np.concatenate(
         [
-            motions.teleoperation(generator, count)
+            motions.teleoperation(generator, len(rig.true.joints))
             for _ in range(math.ceil(seconds / motions.HAND_S))
         ]
     )
-    met = _drawn(generator, np.abs(asked).max(axis=0) / gear) if obstacle else None
-    recording, bending = rig.record(compensated(plant, asked), seed + 2, met)
-    # Later than the motion before by more than any gap: the memory is found again.
-    later = known.duration + motions.HAND_S
-    forces = watched(estimator, recording, later)
-    lever = np.array([tip_lever(q, estimator.section_length) for q in bending])
-    moments = rig.moment(met, bending) if met else np.zeros_like(bending)
-    stamps = recording.bending.time + later
+    largest = np.abs(asked).max(axis=0) / shipped_rig().joints.gear
+    met = drawn(generator, largest) if obstacle else None
+    recording, bending = rig.record(compensated(ready.plant, asked), seed + 2, met)
+    forces = watched(estimator, recording, ready.later)
+    true_forces = rig.forces(met, bending) if met else np.zeros_like(bending)
+    stamps = recording.bending.time + ready.later
     at = np.array([force.time for force in forces])
-    true = [np.interp(at, stamps, column / lever) for column in moments.T]
+    true = [np.interp(at, stamps, column) for column in true_forces.T]
     return Touched(tuple(forces), np.stack(true, axis=1))
 
 
@@ -137,7 +160,8 @@ def identified(recording: RigRecording, described: PlantDescription) -> PlantDes
     return replace(described, joints=joints)
 
 
-def _drawn(generator: np.random.Generator, largest: Array) -> Obstacle:
+def drawn(generator: np.random.Generator, largest: Array) -> Obstacle:
+    """Draw an obstacle in the way of a motion with these largest angles (J,) in rad."""
     joint = int(generator.integers(len(largest)))
     side = float(generator.choice([-1.0, 1.0]))
     angle = side * generator.uniform(*DEPTH) * float(largest[joint])
@@ -164,17 +188,36 @@ def compensated(plant: PlantDescription, shaft: Array) -> Array:
 
 def watched(estimator: TipForceEstimator, recording: RigRecording, later: float) -> list[TipForce]:
     """Forces from a recording whose stamps are later by so many s, in portions as they arrive."""
+    found = []
+    for begin in np.arange(0.0, recording.duration, _PORTION_S):
+        found += portion(estimator, recording, later, (begin, begin + _PORTION_S))
+    return found
+
+
+def portion(
+    estimator: TipForceEstimator,
+    recording: RigRecording,
+    later: float,
+    between: tuple[float, float],
+) -> list[TipForce]:
+    """Forces that are found once what was recorded between two times in s has arrived."""
     measured = recording.measured()
     streams = (
         (estimator.motor, measured['shaft_position']),
         (estimator.wires, measured['tension']),
         (estimator.tracker, measured['bending']),
     )
-    found = []
-    for begin in np.arange(0.0, recording.duration, _PORTION_S):
-        end = begin + _PORTION_S
-        for samples, series in streams:
-            rows = slice(*np.searchsorted(series.time, [begin, end]))
-            samples.append(series.time[rows] + later, series.values[rows])
-        found += estimator.update(later + end)
-    return found
+    for samples, series in streams:
+        rows = slice(*np.searchsorted(series.time, between))
+        samples.append(series.time[rows] + later, series.values[rows])
+    return estimator.update(later + between[1])
+
+
+def free_tails(simulator: str, seed: int) -> list[tuple[float, float, int, float]]:
+    """`FreeMotion.tail` of every joint of a rig, after 60 s of motion more."""
+    ready = prepared(simulator, seed)
+    estimator, count = ready.estimator, len(ready.rig.true.joints)
+    asked = np.concatenate([motions.teleoperation(ready.generator, count) for _ in range(2)])
+    estimator.free = True
+    watched(estimator, ready.rig.record(compensated(ready.plant, asked), seed + 2)[0], ready.later)
+    return [each.tail() for each in estimator.free_motion]

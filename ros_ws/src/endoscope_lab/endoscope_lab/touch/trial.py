@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from endoscope_core.tip_force.estimator import AHEAD_S, REPORTED_WITHIN_S
 from endoscope_core.tip_force.free_motion import BLOCK_S
 from endoscope_lab.bench import keep_row, report, rows_so_far, side_by_side, table_head, table_row
-from endoscope_lab.touch import visible
+from endoscope_lab.touch import derivation, push, visible
 from endoscope_lab.touch.touched_rig import SIMULATORS, Touched, touched
 
 TWICE = 2.0
@@ -46,9 +46,14 @@ class Row:
 
 def run(args: argparse.Namespace) -> int:
     """Print the tables; return 0."""
+    if args.derive:
+        derivation.run(args.seeds, args.jobs)
+        return 0
     if args.visible:
         visible.run(args.seeds[0], args.jobs)
         return 0
+    if args.push is not None:
+        return _pushes(args)
     rows = {(r.simulator, r.seed, r.obstacle): r for r in rows_so_far(args.json, Row)}
     cases = [(s, seed, True) for seed in args.seeds for s in SIMULATORS]
     cases += [(s, seed, False) for seed in args.free for s in SIMULATORS]
@@ -58,6 +63,18 @@ def run(args: argparse.Namespace) -> int:
         keep_row(args.json, rows[case])
         report(f'{number} of {len(calls)}: {case[0]}, seed {case[1]}')
     _print([rows[case] for case in cases])
+    return 0
+
+
+def _pushes(args: argparse.Namespace) -> int:
+    rows = {(r.simulator, r.seed): r for r in rows_so_far(args.json, push.Push)}
+    cases = [(simulator, seed) for seed in args.push for simulator in SIMULATORS]
+    calls = [case for case in cases if case not in rows]
+    for number, (case, future) in enumerate(side_by_side(args.jobs, push.judged, calls), 1):
+        rows[case] = future.result()
+        keep_row(args.json, rows[case])
+        report(f'{number} of {len(calls)}: {case[0]}, seed {case[1]}')
+    push.print_pushes([rows[case] for case in cases])
     return 0
 
 
