@@ -13,7 +13,7 @@ FALSE_ALARM_S = 20.0 * 3600.0
 """Of motion in free space, in which one block may show as much as a force that is seen."""
 TAIL = 0.1
 """Share of free motion that shows how rare larger misfits are."""
-PRIOR_EXCESS, PRIOR_CLUSTERS = 0.09, 4.0
+PRIOR_EXCESS, PRIOR_CLUSTERS = 0.09, 3.9
 """Mean excess over the level of that tail, in half-widths of a joint's set, and after how many
 clusters a rig's own counts as much: by `endoscope bench touch --derive`, over rigs."""
 LEAST = 100
