@@ -151,22 +151,26 @@ def test_the_least_that_is_seen_is_rare_and_what_few_excursions_show_is_doubted(
     many, few = FreeMotion(), FreeMotion()
     for value in excess:
         assert not many.is_learnt
-        many.learn(value, value, 1e-3)
+        many.learn(value, value, 1e-3, True)
     assert many.is_learnt
     # Of independent blocks, once in 20 h is once in 2,880,000.
     assert many.least_seen == pytest.approx(1e-4 * math.log(72_000.0 / 0.025), rel=0.05)
     assert many.bound == pytest.approx(np.quantile(excess, 0.95), rel=0.01)
     # The same excesses in three excursions say less of how large the next one is.
     for value in np.concatenate([np.sort(excess[k : k + 40]) for k in (0, 40, 80)]):
-        few.learn(value, value, 1e-3)
+        few.learn(value, value, 1e-3, True)
     assert few.least_seen > 1.5 * many.least_seen
     few.forget()
     before = few.least_seen
     for _ in range(LEAST - 1):
-        few.learn(0.0, 0.0, 0.0)
+        few.learn(0.0, 0.0, 0.0, True)
     assert few.least_seen == before
-    few.learn(0.0, 0.0, 0.0)
+    few.learn(0.0, 0.0, 0.0, True)
     assert few.least_seen == 0.0
+    # What may be a contact widens nothing.
+    for _ in range(LEAST):
+        few.learn(1e-3, 1e-3, 1e-3, False)
+    assert few.least_seen == few.bound == 0.0
 
 
 def test_bounds_are_learnt_on_until_something_is_seen() -> None:

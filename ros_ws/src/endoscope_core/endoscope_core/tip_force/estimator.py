@@ -140,13 +140,13 @@ class _Joint:
         """Whether that is more than free motion shows."""
         return self.lasting > self.free.least_seen
 
-    def learn(self) -> None:
-        """Add the last block to those of free motion."""
+    def learn(self, certain: bool) -> None:
+        """Add the last block to those of free motion, which it is `certain` to be or not."""
         if len(self._last) == LASTING:
             last = self._last[-1]
             # By how much zero is outside of the set; negative within it.
             half = 0.5 * (last.high - last.low)
-            self.free.learn(max(last.low, -last.high), self.lasting, half)
+            self.free.learn(max(last.low, -last.high), self.lasting, half, certain)
 
 
 class TipForceEstimator:
@@ -289,7 +289,7 @@ class TipForceEstimator:
         goes_on = known and not any(j.is_touched or j.free.is_learnt for j in self._joints)
         if self._free or goes_on:
             for joint in self._joints:
-                joint.learn()
+                joint.learn(self._free)
         if not known:
             self.state = State.NOT_CALIBRATED
             return None

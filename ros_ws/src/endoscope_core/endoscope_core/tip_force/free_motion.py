@@ -19,7 +19,7 @@ clusters a rig's own counts as much: by `endoscope bench touch --derive`, over r
 LEAST = 100
 """Blocks of free motion, 2.5 s, from which bounds are known: ten in the tail."""
 MOST = 24_000
-"""Blocks that are learnt from, 10 min: a contact too light to be seen would be learnt as well."""
+"""Blocks that are learnt from, 10 min."""
 _DERIVED = 40
 """Blocks after which bounds are derived again, a second."""
 
@@ -50,21 +50,27 @@ class FreeMotion:
         """Begin anew; bounds stay until there are others."""
         self._misfits, self._lasting, self._halves = [], [], []
 
-    def learn(self, misfit: float, lasting: float, half: float) -> None:
+    def learn(self, misfit: float, lasting: float, half: float, certain: bool) -> None:
         """Add a block by how much zero is outside of its set, and of all of the last ones, N m.
 
-        `half` is the half-width of the set.
+        `half` is the half-width of the set; `certain` that nothing touches the tip. What may be a
+        contact too light to be seen makes bounds narrower, and never wider.
         """
         self._misfits.append(misfit)
         self._lasting.append(lasting)
         self._halves.append(half)
         count = len(self._misfits)
         if count == LEAST or (count > LEAST and count % _DERIVED == 0):
-            self._derive()
+            bound, least_seen = self._derived()
+            if certain or math.isnan(self.bound):
+                self.bound, self.least_seen = bound, least_seen
+            else:
+                self.bound = min(self.bound, bound)
+                self.least_seen = min(self.least_seen, least_seen)
 
-    def _derive(self) -> None:
+    def _derived(self) -> tuple[float, float]:
         ordered = np.sort(self._misfits)
-        self.bound = max(0.0, float(ordered[round(COVERED * len(ordered))]))
+        bound = max(0.0, float(ordered[round(COVERED * len(ordered))]))
         level, excess, clusters, half = self.tail()
         # What exceeds a high level does so by an exponentially distributed amount (Pickands, Ann.
         # Statist. 3(1), 1975, of a light tail), in clusters of which each counts once (Leadbetter,
@@ -74,7 +80,7 @@ class FreeMotion:
         n = clusters + PRIOR_CLUSTERS
         seen = clusters * excess + PRIOR_CLUSTERS * PRIOR_EXCESS * half
         rarity = math.log(TAIL * FALSE_ALARM_S / BLOCK_S)
-        self.least_seen = max(0.0, level + seen * math.expm1(rarity / n))
+        return bound, max(0.0, level + seen * math.expm1(rarity / n))
 
     def tail(self) -> tuple[float, float, int, float]:
         """Level of the tail, mean excess over it, clusters, and median half-width; N m."""
