@@ -20,6 +20,7 @@ NODES = (
     'controller',
     'calibration',
     'master',
+    'tip_force',
     'recorder',
 )
 GRAPH = 'graph'

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import TwistStamped
 from sensor_msgs.msg import JointState, Joy
 from std_msgs.msg import Header, String
 
@@ -18,6 +19,7 @@ from endoscope_lab.faults.node_processes import GRAPH, NODES
 from endoscope_lab.faults.process_rig import ProcessRig
 from endoscope_lab.faults.trace import ShaftTrace, goal_step
 from endoscope_nodes.names import (
+    BOUNDS,
     CALIBRATION_COMMAND,
     CALIBRATION_RESULT,
     CORRECTION,
@@ -29,6 +31,9 @@ from endoscope_nodes.names import (
     MOTORS,
     OPERATING_STATE,
     SLAVE_COMMAND,
+    SLAVE_VELOCITY,
+    TIP_FORCE_BOUNDS,
+    TIP_VELOCITY,
 )
 from endoscope_nodes.runtime.diagnostics import OK, status
 from endoscope_nodes.runtime.qos import COMMAND, EVENT, RESULT, SENSOR_OFFERED
@@ -216,6 +221,25 @@ def _command(names: tuple[str, ...], rig: ProcessRig) -> JointState:
     return message
 
 
+def _velocity(rig: ProcessRig) -> JointState:
+    velocity = rig.random.choice(([1.0, -1.0], [1e9, 0.0], [math.nan, 0.0]))
+    message = JointState(name=list(JOINTS), velocity=velocity)
+    message.header.frame_id = rig.operator.graph.session
+    return message
+
+
+def _twist(rig: ProcessRig) -> TwistStamped:
+    message = TwistStamped()
+    message.header.frame_id = rig.operator.graph.session
+    message.twist.angular.x = rig.random.choice((1.0, 1e9, math.nan))
+    return message
+
+
+def _force(rig: ProcessRig) -> JointState:
+    force = rig.random.choice((0.0, 0.5, -0.5, 1e9, math.nan))
+    return JointState(name=list(BOUNDS), effort=[force] * 6 + [1.0])
+
+
 def _result(rig: ProcessRig) -> DiagnosticArray:
     message = DiagnosticArray()
     message.header.frame_id = rig.operator.graph.session
@@ -274,6 +298,9 @@ def _competing_publishers() -> dict[str, ProcessFault]:
         MOTION_SESSION: _publish(Header, MOTION_SESSION, lambda _: Header(frame_id='x-1'), EVENT),
         CALIBRATION_RESULT: _publish(DiagnosticArray, CALIBRATION_RESULT, _result, RESULT),
         MASTER_CLUTCH: _publish(Joy, MASTER_CLUTCH, _clutch, EVENT),
+        SLAVE_VELOCITY: _publish(JointState, SLAVE_VELOCITY, _velocity, COMMAND),
+        TIP_VELOCITY: _publish(TwistStamped, TIP_VELOCITY, _twist, COMMAND),
+        TIP_FORCE_BOUNDS: _publish(JointState, TIP_FORCE_BOUNDS, _force, SENSOR_OFFERED),
     }
     faults = commands | others
     return {f'competing publisher on {topic}': fault for topic, fault in faults.items()}
