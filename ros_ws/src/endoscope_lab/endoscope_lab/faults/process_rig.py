@@ -65,7 +65,9 @@ class ProcessRig(ClosedOnExit):
 
     def start(self, name: str) -> None:
         first = 'motor_driver' if name == GRAPH else name
-        parameters: dict[str, dict[str, object]] = {first: {'tick_rate': self.rate}}
+        # Faults are timed by the computer's clock, which a simulated one falls behind.
+        of_first: dict[str, object] = {'tick_rate': self.rate, 'use_sim_time': False}
+        parameters: dict[str, dict[str, object]] = {first: of_first}
         if name in ('master', GRAPH):
             parameters.setdefault('master', {})['source'] = self._source
         if name in ('controller', GRAPH):
