@@ -176,6 +176,22 @@ def test_the_least_that_is_seen_is_rare_and_what_few_excursions_show_is_doubted(
 def test_bounds_are_learnt_on_until_something_is_seen() -> None:
     plant = PlantDescription(joints={NAME: PlantDescription().joints[NAME]})
     estimator = _calibrated(plant)
-    found, _ = _feed(estimator, plant, _sweeps(30.0), 30.0, 5)
-    assert found[-1].visible < 0.7 * found[0].visible
+    before = estimator.free_motion[0].least_seen
+    found, _ = _feed(estimator, plant, _sweeps(20.0), 30.0, 5)
+    assert estimator.free_motion[0].least_seen < 0.8 * before
     assert not any(f.seen for f in found)
+
+
+def test_noise_pushes_no_joint_at_rest_and_what_does_is_seen() -> None:
+    plant = PlantDescription(joints={NAME: PlantDescription().joints[NAME]})
+    estimator = _calibrated(plant)
+    command = np.concatenate([_sweeps(12.0), np.zeros((17_000, 1))])
+    fading = np.clip((11.0 - np.arange(len(command)) * 1e-3) / 2.0, 0.0, 1.0)
+    push = {'moment_nm': 0.004, 'time_s': 27.0, 'duration_s': 0.2}
+    pushed = replace(plant, effects=(EffectSpec('external_load', NAME, push),))
+    found, _ = _feed(estimator, pushed, command * fading[:, None] ** 2, 30.0, 4)
+    resting = [f for f in found if 30.0 + 11.5 < f.time < 30.0 + 26.9]
+    assert len(resting) > 500
+    assert not any(f.seen for f in resting)
+    assert max(f.size for f in resting) < 0.02
+    assert all(f.seen for f in found if f.time > 30.0 + 27.6)

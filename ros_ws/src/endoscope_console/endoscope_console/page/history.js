@@ -90,17 +90,20 @@ export class History {
   }
 }
 
-/** A path of actual against wanted angle, both in deg; grows only while the wanted one moves. */
+/** A path of actual against wanted angle, both in deg; grows only while the wanted one moves, or the
+ * other by `least`. */
 export class Loop {
-  constructor(size = 900) {
+  constructor(size = 900, least = Infinity) {
     this._size = size;
+    this._least = least;
     this.wanted = [];
     this.actual = [];
   }
 
   take(wanted, actual) {
     if (wanted === null || actual === null) return false;
-    if (this.wanted.length && Math.abs(wanted - this.wanted.at(-1)) < 0.05) return false;
+    const moved = !this.wanted.length || Math.abs(wanted - this.wanted.at(-1)) >= 0.05;
+    if (!moved && Math.abs(actual - this.actual.at(-1)) < this._least) return false;
     this.wanted.push(wanted);
     this.actual.push(actual);
     if (this.wanted.length > this._size) {

@@ -10,7 +10,7 @@ const STEPS_DEG = [15, 30, 60, 90, 120];
 const STEPS_N = [0.2, 0.5, 1, 2, 5, 10, 20];
 export const UNCOMPENSATED = 'none';
 
-const newPaths = () => ({ before: new Loop(), after: new Loop(), force: new Loop() });
+const newPaths = () => ({ before: new Loop(), after: new Loop(), force: new Loop(900, 0.01) });
 
 export class Loops {
   /**

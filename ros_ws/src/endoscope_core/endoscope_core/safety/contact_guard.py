@@ -91,8 +91,8 @@ class ContactGuard:
     long as it does, motion with the force passes. Against it the joint follows at no more than
     `speed` in m/s of the tip: above the limit only while the target moves on, below it until it is
     there. It ends once the force is below the limit and the target no longer ahead, so that the
-    slave does not leap when an obstacle gives way; without any estimate, once the target turns
-    back. Otherwise all passes unchanged. Times are monotonic, in ns.
+    slave does not leap when an obstacle gives way; without any estimate, once the target is back
+    behind what was sent. Otherwise all passes unchanged. Times are monotonic, in ns.
 
     `lever` gives the way of the tip in m for a radian at angles (J,) in rad.
     """
@@ -111,7 +111,9 @@ class ContactGuard:
         self._now_ns = self._felt_ns = 0
 
     def feel(self, felt: FeltForce) -> None:
-        """Take an estimate of the force."""
+        """Take an estimate of the force, unless it is silent already or there is a newer one."""
+        if felt.time_ns < max(self._felt_ns, self._now_ns - SILENT_NS):
+            return
         self._felt_ns = felt.time_ns
         for j, joint in enumerate(self._joints):
             joint.feel(felt, j, self.limit, self._asked[j])
@@ -151,7 +153,9 @@ class ContactGuard:
         self._now_ns, asked, speeds = now_ns, tuple(angle), tuple(velocity)
         sent = asked
         if any(joint.yielding for joint in self._joints):
-            most = self.speed / self._lever(self._sent) * seconds
+            # The tip goes on by no more, however many joints do.
+            many = math.sqrt(sum(joint.yielding for joint in self._joints))
+            most = self.speed / self._lever(self._sent) * seconds / many
             sent = tuple(map(self._kept, self._joints, self._sent, asked, [most] * len(asked)))
             if speeds:
                 moved = zip(sent, asked, self._sent, speeds, strict=True)
@@ -176,8 +180,8 @@ class ContactGuard:
 
     @property
     def state(self) -> GuardState:
-        """Whether it can judge, and whether it acts."""
-        if any(joint.yielding for joint in self._joints):
+        """Whether it can judge, and whether it acts on a stream of commands."""
+        if self._sent and any(joint.yielding for joint in self._joints):
             return GuardState.YIELDING
         known = any(joint.is_known(self._now_ns) for joint in self._joints)
         return GuardState.WATCHING if known else GuardState.OFF

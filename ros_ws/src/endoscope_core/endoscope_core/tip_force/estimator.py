@@ -21,7 +21,7 @@ from endoscope_core.tip_force.external_moment import (
     ExternalMoment,
     MomentSet,
 )
-from endoscope_core.tip_force.free_motion import BLOCK_S, FreeMotion
+from endoscope_core.tip_force.free_motion import BLOCK_S, LEAST, FreeMotion
 
 Array = NDArray[np.float64]
 
@@ -36,6 +36,11 @@ _GAP_S, _TRACKER_GAP_S = AHEAD_S, 0.15
 sheaths is unknown."""
 _LATE_S = 0.3
 """Largest latency of samples."""
+AT_REST_RAD = 2.0 * 2.0 * math.pi / 4096
+"""Two counts of an encoder, by which readings of a shaft at rest differ."""
+_MOVED = 2.0
+"""Half-widths of its bounds by which an angle differs from the mean of a rest only where it moves:
+four standard deviations."""
 SWEEPS, LEAST_RANGE_RAD = 2.0, 0.3
 """Travel over the visited range, and that range in rad of the shaft, after which a joint's memory
 is that of the path: once to either end of it (return-point memory; Mayergoyz, 1991, ch. I)."""
@@ -111,6 +116,7 @@ class _Joint:
         self._way, self._low, self._high = 0.0, math.inf, -math.inf
         self._shaft = math.nan
         self._last: deque[MomentSet] = deque(maxlen=LASTING)
+        self._rest: list[float] = []  # angles of the blocks since the shaft stands still, rad
 
     @property
     def memory_is_known(self) -> bool:
@@ -119,14 +125,32 @@ class _Joint:
         return visited >= LEAST_RANGE_RAD and self._way >= SWEEPS * visited
 
     def follow(self, block: Block) -> MomentSet:
-        """As `ExternalMoment.follow`."""
+        """As `ExternalMoment.follow`; while the joint is at rest, the last set."""
         shaft = block.shaft
+        if self._stands_still(block):
+            # Nothing acts but what did. Noise of the tracker, block after block, would have
+            # friction build up and look like a push within seconds.
+            return self._last[-1]
         if not math.isnan(self._shaft):
             self._way += float(np.abs(np.diff(shaft, prepend=self._shaft)).sum())
         self._shaft = float(shaft[-1])
         self._low, self._high = min(self._low, shaft.min()), max(self._high, shaft.max())
         self._last.append(self.observer.follow(block))
         return self._last[-1]
+
+    def _stands_still(self, block: Block) -> bool:
+        """Whether neither shaft nor tip has moved for longer than a contact takes to be seen."""
+        moved = not np.abs(block.shaft - self._shaft).max() <= AT_REST_RAD
+        if self._rest:
+            away = abs(block.angle - sum(self._rest) / len(self._rest))
+            moved = moved or away > _MOVED * block.half_width
+        self._rest = [] if moved else [*self._rest, block.angle][-LEAST:]
+        return self.is_at_rest
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether the last block was not followed."""
+        return len(self._rest) > LASTING
 
     @property
     def lasting(self) -> float:
@@ -142,7 +166,7 @@ class _Joint:
 
     def learn(self, certain: bool) -> None:
         """Add the last block to those of free motion, which it is `certain` to be or not."""
-        if len(self._last) == LASTING:
+        if len(self._last) == LASTING and not self.is_at_rest:
             last = self._last[-1]
             # By how much zero is outside of the set; negative within it.
             half = 0.5 * (last.high - last.low)

@@ -20,8 +20,8 @@ LEAST = 100
 """Blocks of free motion, 2.5 s, from which bounds are known: ten in the tail."""
 MOST = 24_000
 """Blocks that are learnt from, 10 min."""
-_DERIVED = 40
-"""Blocks after which bounds are derived again, a second."""
+_GROWN = 1.1
+"""Blocks over those at which bounds were derived last, at which they are derived again."""
 
 
 class FreeMotion:
@@ -40,6 +40,7 @@ class FreeMotion:
         self._misfits: list[float] = []
         self._lasting: list[float] = []
         self._halves: list[float] = []
+        self._due = float(LEAST)
 
     @property
     def is_learnt(self) -> bool:
@@ -49,6 +50,7 @@ class FreeMotion:
     def forget(self) -> None:
         """Begin anew; bounds stay until there are others."""
         self._misfits, self._lasting, self._halves = [], [], []
+        self._due = float(LEAST)
 
     def learn(self, misfit: float, lasting: float, half: float, certain: bool) -> None:
         """Add a block by how much zero is outside of its set, and of all of the last ones, N m.
@@ -59,8 +61,8 @@ class FreeMotion:
         self._misfits.append(misfit)
         self._lasting.append(lasting)
         self._halves.append(half)
-        count = len(self._misfits)
-        if count == LEAST or (count > LEAST and count % _DERIVED == 0):
+        if len(self._misfits) >= self._due:
+            self._due *= _GROWN
             bound, least_seen = self._derived()
             if certain or math.isnan(self.bound):
                 self.bound, self.least_seen = bound, least_seen

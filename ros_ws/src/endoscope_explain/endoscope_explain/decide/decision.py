@@ -161,7 +161,7 @@ def _named_as_chosen(
 ) -> tuple[MissingTerm, ...]:
     """The missing terms as chosen: a rival of the first one may have led to a better two."""
     named = []
-    adding = [level for level in search.levels if not level.adds_nothing(level.best)]
+    adding = [each for each in search.levels if each.found and not each.adds_nothing(each.best)]
     for position, term in enumerate(chosen.terms):
         if term.multiplies:
             continue
@@ -169,8 +169,13 @@ def _named_as_chosen(
             named.append(missing[position])
             continue
         level = adding[position]
-        own = [c for c in level.found if c.terms and c.terms[-1].id == term.id]
-        named.append(_missing(level, own[0], jobs))
+        own = next((c for c in level.found if c.terms and c.terms[-1].id == term.id), None)
+        if own is None:
+            # One of a pair that replaced what was found first: it was tried beside the other.
+            others = (*chosen.terms[:position], *chosen.terms[position + 1 :])
+            level = adding[len(chosen.terms) - 1]
+            own = replace(chosen, terms=(*others, term))
+        named.append(_missing(level, own, jobs))
     # What is missing besides is no other name of it.
     names = {term.name for term in named}
     return tuple(replace(term, contest=term.contest.without(names - {term.name})) for term in named)

@@ -140,13 +140,15 @@ def held_out_misfit(observation: JointObservation, residuals: Array) -> float:
 
 BATCHES, WORSE = 20, 0.025
 """Parts of what was held out whose means scatter independently (Schmeiser, Oper. Res. 30(3), 1982:
-10 to 30 serve), and the chance at which a signal is predicted worse by scatter alone."""
+10 to 30 serve), and the chance at which any signal is predicted worse by scatter alone."""
 
 
 def predicts_worse(observation: JointObservation, before: Array, after: Array) -> bool:
     """Whether residuals (size,) exceed earlier ones in any signal, on what was held out."""
     _, judged = held_out(observation)
-    for part in observation.slices():
+    parts = observation.slices()
+    least = float(t.ppf(1.0 - WORSE / len(parts), BATCHES - 1))
+    for part in parts:
         use = judged[part] if judged[part].any() else np.ones_like(judged[part])
         squares = np.stack([before[part][use] ** 2, after[part][use] ** 2])
         if squares.shape[1] < BATCHES:
@@ -154,7 +156,10 @@ def predicts_worse(observation: JointObservation, before: Array, after: Array) -
         means = np.array([[np.mean(b) for b in np.array_split(row, BATCHES)] for row in squares])
         # Below its noise no signal is predicted better or worse.
         rise = np.diff(np.maximum(means, 1.0), axis=0)[0]
-        if np.mean(rise) > t.ppf(1.0 - WORSE, BATCHES - 1) * np.std(rise, ddof=1) / BATCHES**0.5:
+        scatter = float(np.std(rise, ddof=1)) / math.sqrt(BATCHES)
+        # What the noise hides, see `is_noise`, is not worse.
+        hidden = LIMIT * math.sqrt(2.0 / squares.shape[1])
+        if np.mean(rise) > max(least * scatter, hidden):
             return True
     return False
 

@@ -66,8 +66,6 @@ class Level:
     judge: Judge = NOT_JUDGED
     # Candidates that explain what they were fitted to, and do not foretell what they were not.
     not_foretelling: tuple[Candidate, ...] = ()
-    # One more that was added to, with a term that no level before has fitted.
-    instead: Candidate | None = None
 
     def gain(self, one: Candidate) -> float:
         """Logarithm of the evidence of a candidate over its parent's."""
@@ -188,9 +186,6 @@ def search(
         if all(term.is_in_every_rig for term in parents[0].candidate.terms):
             first = screens[0]
         level = _level(screens, first, jobs, other_numbers=not changed)
-        if level.instead is not None:
-            before = levels[-1]
-            levels[-1] = replace(before, found=_ranked([*before.found, level.instead]))
         levels.append(level)
         report(f'{joint}: {_in_words(level)}')
         if not level.is_found:
@@ -262,9 +257,7 @@ def _level(
         for parent in parents
         if other_numbers and any(map(is_at_tolerance, parent.fits))
     ]
-    more = _instead(parents[0], base, found, jobs)
-    if more is not None:
-        found += expanded(more, jobs)
+    found += _of_other_pairs(parents[0], base, found, jobs)
     level = _judged(parents[0], found, screens[0], jobs)
     if not (level.is_found or (level.found and level.found[0].is_noise)):
         others = before_giving_up(screens[0], found, jobs)
@@ -272,20 +265,24 @@ def _level(
             level = replace(level, found=_ranked([*level.found, *others]))
         else:
             level = _judged(parents[0], [*found, *others], screens[0], jobs)
-    return level if more is None else replace(level, instead=more.parent.candidate)
+    return level
 
 
-def _instead(
+def _of_other_pairs(
     parent: Candidate, base: Screened | None, found: Sequence[Candidate], jobs: int
-) -> Screened | None:
-    """The screen of another first term, where a pair of the screen's has more evidence."""
+) -> list[Candidate]:
+    """Candidates beside another first term, where a pair of the screen's has more evidence."""
     if base is None or len(parent.fits) > 1:
-        return None
+        return []
     if len(parent.terms) != len(base.parent.candidate.terms) + 1:
-        return None
+        return []
     pairs = [c for c in found if len(c.terms) > len(parent.terms)]
-    other = better_pair(base, pairs, jobs)
-    return None if other is None else screen_terms(other, jobs, base.left_out, base.known)
+    better = better_pair(base, pairs, jobs)
+    if better is None:
+        return []
+    first, both = better
+    screen = screen_terms(first, jobs, base.left_out, base.known)
+    return [both, *expanded(screen, jobs)]
 
 
 def _judged(first: Candidate, found: list[Candidate], screen: Screened, jobs: int) -> Level:

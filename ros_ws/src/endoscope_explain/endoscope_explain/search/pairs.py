@@ -40,8 +40,10 @@ class Pair:
         return frozenset(term.variant for term in self.terms)
 
 
-def better_pair(base: Screened, found: Sequence[Candidate], jobs: int) -> Parent | None:
-    """A candidate with one term more than the base, where beside it another one beats all found.
+def better_pair(
+    base: Screened, found: Sequence[Candidate], jobs: int
+) -> tuple[Parent, Candidate] | None:
+    """A pair that has more evidence than all found, and its first term alone; None for no such one.
 
     `base` is the screen of the candidate that `found` has two terms more than, of one recording.
     """
@@ -60,7 +62,7 @@ def better_pair(base: Screened, found: Sequence[Candidate], jobs: int) -> Parent
     if one is None or both.evidence <= best.evidence:
         return None
     one = converged(one)
-    return Parent(one, tuple((own,) for own in one.fits))
+    return Parent(one, tuple((own,) for own in one.fits)), converged(both)
 
 
 def _fitted(base: Screened, first: Term, second: Term) -> tuple[Candidate, Candidate]:

@@ -74,9 +74,12 @@ def test_a_pair_replaces_what_two_others_were_taken_for(two_missing):
     one = refit((trial_fit(nominal.fits, of['viscous_friction'], behind.offset),), nominal)
     seen = trial_fit(one.fits, of['load_cell_bias'], background(one.fit).offset)
     wrong = refit((seen,), one)
-    parent = better_pair(two_missing, [wrong], 1)
-    assert parent is not None
-    assert parent.candidate.effects[0] in {'gravity', 'load_cell_gain'}
+    better = better_pair(two_missing, [wrong], 1)
+    assert better is not None
+    first, both = better
+    assert first.candidate.effects == both.effects[:1]
+    assert set(both.effects) == {'gravity', 'load_cell_gain'}
+    assert both.evidence > wrong.evidence
     right = refit((trial_fit(nominal.fits, of['gravity'], behind.offset),), nominal)
     seen = trial_fit(right.fits, of['load_cell_gain'], background(right.fit).offset)
     assert better_pair(two_missing, [wrong, refit((seen,), right)], 1) is None
