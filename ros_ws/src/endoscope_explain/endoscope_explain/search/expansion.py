@@ -55,6 +55,11 @@ class Parent:
     # Of each recording, the candidate's fit, and others from which a trial fit may begin.
     references: tuple[tuple[Fit, ...], ...]
 
+    @classmethod
+    def of(cls, candidate: Candidate) -> 'Parent':
+        """With its own fits alone."""
+        return cls(candidate, tuple((own,) for own in candidate.fits))
+
 
 @dataclass(frozen=True)
 class Screened:

@@ -199,10 +199,7 @@ def search(
         stands = level.adds_nothing(best) or best.terms[-1].is_nominal
         others = [] if stands else [*level.variants(), *level.rivals()]
         others = [c for c in others if not level.adds_nothing(c)][: PARENTS - 1]
-        parents = [
-            Parent(each, tuple((own,) for own in each.fits))
-            for each in (best, *map(converged, others))
-        ]
+        parents = [Parent.of(each) for each in (best, *map(converged, others))]
     if parents[0].candidate.is_noise:
         report(f'{joint}: only noise is left beside {_names(parents[0].candidate) or "nothing"}')
     return JointSearch(nominal, tuple(levels))

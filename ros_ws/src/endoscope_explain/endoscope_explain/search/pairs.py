@@ -61,8 +61,7 @@ def better_pair(
     one, both = max(fitted, key=lambda each: each[1].evidence, default=(None, best))
     if one is None or both.evidence <= best.evidence:
         return None
-    one = converged(one)
-    return Parent(one, tuple((own,) for own in one.fits)), converged(both)
+    return Parent.of(converged(one)), converged(both)
 
 
 def _fitted(base: Screened, first: Term, second: Term) -> tuple[Candidate, Candidate]:

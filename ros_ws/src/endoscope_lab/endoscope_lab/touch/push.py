@@ -68,6 +68,11 @@ class Push:
     when_yielding: float  # force then; the largest where it does not yield
 
     @property
+    def case(self) -> tuple[str, int]:
+        """As it was asked for."""
+        return self.simulator, self.seed
+
+    @property
     def ratio(self) -> float:
         """Largest force with the guard over that without it."""
         return self.guarded / self.without if self.without else 1.0

@@ -130,16 +130,16 @@ def prepared(simulator: str, seed: int) -> Prepared:
     return Prepared(generator, rig, plant, estimator, known.duration + motions.HAND_S)
 
 
+def teleoperation(generator: np.random.Generator, joints: int, hands: int) -> Array:
+    """Some motions of a hand, 30 s each, one after the other (N, joints), as `motions` has them."""
+    return np.concatenate([motions.teleoperation(generator, joints) for _ in range(hands)])
+
+
 def touched(simulator: str, seed: int, obstacle: bool = True, seconds: float = 30.0) -> Touched:
     """Have a prepared rig touch something in teleoperation."""
     ready = prepared(simulator, seed)
     generator, rig, estimator = ready.generator, ready.rig, ready.estimator
-    asked = np.concatenate(
-        [
-            motions.teleoperation(generator, len(rig.true.joints))
-            for _ in range(math.ceil(seconds / motions.HAND_S))
-        ]
-    )
+    asked = teleoperation(generator, len(rig.true.joints), math.ceil(seconds / motions.HAND_S))
     largest = np.abs(asked).max(axis=0) / shipped_rig().joints.gear
     met = drawn(generator, largest) if obstacle else None
     recording, bending = rig.record(compensated(ready.plant, asked), seed + 2, met)
@@ -217,7 +217,7 @@ def free_tails(simulator: str, seed: int) -> list[tuple[float, float, int, float
     """`FreeMotion.tail` of every joint of a rig, after 60 s of motion more."""
     ready = prepared(simulator, seed)
     estimator, count = ready.estimator, len(ready.rig.true.joints)
-    asked = np.concatenate([motions.teleoperation(ready.generator, count) for _ in range(2)])
+    asked = teleoperation(ready.generator, count, 2)
     estimator.free = True
     watched(estimator, ready.rig.record(compensated(ready.plant, asked), seed + 2)[0], ready.later)
     return [each.tail() for each in estimator.free_motion]

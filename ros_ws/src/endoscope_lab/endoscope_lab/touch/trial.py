@@ -1,8 +1,9 @@
 """`endoscope bench touch`: error and bounds of the force at the tip, contacts and false alarms."""
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +44,11 @@ class Row:
     reported: int
     false_alarms: int
 
+    @property
+    def case(self) -> tuple[str, int, bool]:
+        """As it was asked for."""
+        return self.simulator, self.seed, self.obstacle
+
 
 def run(args: argparse.Namespace) -> int:
     """Print the tables; return 0."""
@@ -53,29 +59,26 @@ def run(args: argparse.Namespace) -> int:
         visible.run(args.seeds[0], args.jobs)
         return 0
     if args.push is not None:
-        return _pushes(args)
-    rows = {(r.simulator, r.seed, r.obstacle): r for r in rows_so_far(args.json, Row)}
+        pushes = [(simulator, seed) for seed in args.push for simulator in SIMULATORS]
+        push.print_pushes(_rows(args, pushes, push.judged, push.Push))
+        return 0
     cases = [(s, seed, True) for seed in args.seeds for s in SIMULATORS]
     cases += [(s, seed, False) for seed in args.free for s in SIMULATORS]
-    calls = [case for case in cases if case not in rows]
-    for number, (case, future) in enumerate(side_by_side(args.jobs, judged, calls), 1):
-        rows[case] = future.result()
-        keep_row(args.json, rows[case])
-        report(f'{number} of {len(calls)}: {case[0]}, seed {case[1]}')
-    _print([rows[case] for case in cases])
+    _print(_rows(args, cases, judged, Row))
     return 0
 
 
-def _pushes(args: argparse.Namespace) -> int:
-    rows = {(r.simulator, r.seed): r for r in rows_so_far(args.json, push.Push)}
-    cases = [(simulator, seed) for seed in args.push for simulator in SIMULATORS]
+def _rows[C: tuple[Any, ...], R: (Row, push.Push)](
+    args: argparse.Namespace, cases: Sequence[C], judge: Callable[..., R], kind: type[R]
+) -> list[R]:
+    """Rows of all cases, of which those in the file are not judged again."""
+    rows: dict[tuple[Any, ...], R] = {row.case: row for row in rows_so_far(args.json, kind)}
     calls = [case for case in cases if case not in rows]
-    for number, (case, future) in enumerate(side_by_side(args.jobs, push.judged, calls), 1):
+    for number, (case, future) in enumerate(side_by_side(args.jobs, judge, calls), 1):
         rows[case] = future.result()
         keep_row(args.json, rows[case])
         report(f'{number} of {len(calls)}: {case[0]}, seed {case[1]}')
-    push.print_pushes([rows[case] for case in cases])
-    return 0
+    return [rows[case] for case in cases]
 
 
 def judged(simulator: str, seed: int, obstacle: bool) -> Row:

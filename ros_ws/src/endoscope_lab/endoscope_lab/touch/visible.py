@@ -15,7 +15,7 @@ from endoscope_core.rig import shipped_rig
 from endoscope_core.tip_force import TipForceEstimator
 from endoscope_lab.bench import side_by_side, table_head, table_row
 from endoscope_lab.concealed import motions, readings
-from endoscope_lab.touch.touched_rig import compensated, watched
+from endoscope_lab.touch.touched_rig import compensated, teleoperation, watched
 
 TUBES_DEG = (0, 60, 120, 180, 240)
 """Bends of the real tubes that the family was fitted to."""
@@ -60,7 +60,7 @@ def visible(tube_deg: int, seed: int) -> Visible:
         generator = np.random.default_rng([seed, tube_deg])
         joint = shipped_family().joint(math.radians(tube_deg))
         plant = PlantDescription(joints={JOINTS[0]: joint})
-        asked = np.concatenate([motions.teleoperation(generator, 1) for _ in range(_HANDS)])
+        asked = teleoperation(generator, 1, _HANDS)
         clean = readings.read(plant, compensated(plant, asked))
         recording = readings.as_sensed(clean, JOINTS[:1], plant.sensors, seed)
         estimator = TipForceEstimator(plant, shipped_rig().instrument.section_length)
