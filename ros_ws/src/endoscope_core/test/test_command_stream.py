@@ -9,6 +9,7 @@ from endoscope_core.control import AdoptionError, Feedforward, FeedforwardSettin
 from endoscope_core.identification.law_choice import CalibrationFindings, LawChoice
 from endoscope_core.rig import shipped_rig
 from endoscope_core.safety import AdoptionCode, BendingRange, FeltForce, Refusal
+from endoscope_core.safety.contact_guard import CERTAIN
 
 RIG = shipped_rig()
 GEAR = RIG.joints.gear
@@ -49,7 +50,8 @@ class Slave:
     def feel(self, force):
         """Have a force on the first joint that is certain, in N."""
         low, high = (force - 0.02, 0.0), (force + 0.02, 0.0)
-        self.stream.contact.feel(FeltForce(self.now_ns, (force, 0.0), low, high, True))
+        for _ in range(CERTAIN):
+            self.stream.contact.feel(FeltForce(self.now_ns, (force, 0.0), low, high))
 
     def watch(self, pause_ms=0):
         self.now_ns += pause_ms * MS
@@ -167,8 +169,8 @@ def test_the_master_goes_on_slowly_against_a_force_and_calibration_freely():
     before = slave.shafts[0]
     for angle in angles:
         slave.command(0.2 + angle)
-    # Twice what 2 mm/s are in that time, and the last of the motion before.
-    assert slave.shafts[0] - before < 2.0 * 0.2 * 0.2 * GEAR + 0.01
+    # Twice what 0.5 mm/s are in that time, and the last of the motion before.
+    assert slave.shafts[0] - before < 2.0 * 0.05 * 0.2 * GEAR + 0.01
     assert slave.stream.contact.in_words().startswith('yielding: bend_x pushes')
     begin = slave.shafts[0] / GEAR
     for angle in angles:

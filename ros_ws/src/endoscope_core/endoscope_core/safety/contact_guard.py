@@ -8,6 +8,9 @@ from typing import NamedTuple
 SILENT_NS = 350_000_000
 """Age of an estimate from which nothing is known: an estimate is 0.1 s late, and ten of them, 40 a
 second, are missed."""
+CERTAIN = 2
+"""Estimates in a row that have to push too hard. An alarm waits for eight, by which a hand has gone
+on; a false contact costs a moment at contact speed."""
 
 
 class GuardState(StrEnum):
@@ -28,7 +31,6 @@ class FeltForce(NamedTuple):
     force: tuple[float, ...]
     low: tuple[float, ...]
     high: tuple[float, ...]
-    seen: bool  # whether something touches the tip
 
 
 class _Side:
@@ -61,6 +63,7 @@ class _Joint:
         self.force = 0.0
         self.known_ns: int | None = None
         self.towards = 0.0  # sign of the motion against a force above the limit
+        self._pressed = 0  # estimates in a row that are certain of that
 
     @property
     def yielding(self) -> bool:
@@ -71,14 +74,18 @@ class _Joint:
 
     def feel(self, felt: FeltForce, j: int, limit: float, target: float) -> None:
         force, low, high = felt.force[j], felt.low[j], felt.high[j]
+        pressed, self._pressed = self._pressed, 0
         if not (math.isfinite(force) and low <= high):
             return
         certain = low > 0.0 or high < 0.0
         if not certain and 0.5 * (high - low) > limit:
             return  # a force at the limit would be hidden
+        before = self.towards if self.is_known(felt.time_ns) else 0.0
         self.known_ns, self.force = felt.time_ns, force
         self.towards = -math.copysign(1.0, force) if abs(force) > limit else 0.0
-        if certain and felt.seen:
+        if certain and self.towards:
+            self._pressed = pressed + 1 if self.towards == before else 1
+        if self._pressed >= CERTAIN:
             for side in self.sides:
                 if side.sign == self.towards:
                     side.begin(target)
@@ -87,12 +94,12 @@ class _Joint:
 class ContactGuard:
     """Slows a motion of J joints against a force above a limit; it never moves by itself.
 
-    A joint yields from an estimate above `limit` in N whose bounds exclude that nothing pushes. As
-    long as it does, motion with the force passes. Against it the joint follows at no more than
-    `speed` in m/s of the tip: above the limit only while the target moves on, below it until it is
-    there. It ends once the force is below the limit and the target no longer ahead, so that the
-    slave does not leap when an obstacle gives way; without any estimate, once the target is back
-    behind what was sent. Otherwise all passes unchanged. Times are monotonic, in ns.
+    A joint yields from `CERTAIN` estimates in a row above `limit` in N whose bounds exclude that
+    nothing pushes. As long as it does, motion with the force passes. Against it the joint follows
+    at no more than `speed` in m/s of the tip: above the limit only while the target moves on, below
+    it until it is there. It ends once the force is below the limit and the target no longer ahead,
+    so that the slave does not leap when an obstacle gives way; without any estimate, once the
+    target is back behind what was sent. Otherwise all passes unchanged. Times are monotonic, in ns.
 
     `lever` gives the way of the tip in m for a radian at angles (J,) in rad.
     """

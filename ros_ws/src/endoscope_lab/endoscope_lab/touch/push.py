@@ -24,11 +24,10 @@ from endoscope_core.safety import BendingRange, FeltForce, GuardState
 from endoscope_core.signals import hold, sequence
 from endoscope_core.signals.motions import move
 from endoscope_core.tip_force import TipForce
-from endoscope_core.tip_force.estimator import BLOCK_TICKS
+from endoscope_core.tip_force.free_motion import BLOCK_S
 from endoscope_lab.bench import table_head, table_row
 from endoscope_lab.concealed import motions
 from endoscope_lab.touch.touched_rig import (
-    SIMULATORS,
     Obstacle,
     Prepared,
     drawn,
@@ -40,8 +39,8 @@ Array = NDArray[np.float64]
 
 AIM = 0.4
 """Largest force with the guard over that without it."""
-_REACHED_S = (0.5, 1.1)
-"""Range of what a hand takes to where it wants, as in teleoperation."""
+_REACHED_S = (0.5, 5.0)
+"""Range of what a hand takes to where it wants, from a reach in teleoperation to a steady push."""
 _PEAK = 1.875
 """Largest speed of a minimum-jerk motion over its mean."""
 _HELD_S = 1.5
@@ -49,6 +48,10 @@ _SWEEP_S = 0.8
 _BEFORE = 0.8
 """Share of the way to the obstacle that all joints go first, which makes their memory known."""
 _NS_PER_TICK = round(1e9 * TICK)
+_TICKS = round(BLOCK_S / TICK)
+"""Commands between two estimates."""
+_FAST = 1.0
+"""Largest speed of a hand in rad/s, above which it reaches and below which it pushes."""
 
 
 @dataclass(frozen=True)
@@ -86,15 +89,16 @@ class _Hand:
         self.met: Obstacle = drawn(generator, np.full(joints, largest))
         # No faster than a hand is followed.
         fastest = shipped_rig().joints.hand_speed
-        seconds = max(generator.uniform(*_REACHED_S), _PEAK * largest / fastest)
+        drawn_s = math.exp(generator.uniform(*np.log(_REACHED_S)))
+        seconds = max(drawn_s, _PEAK * largest / fastest)
         self.speed = _PEAK * largest / seconds
         near, deep = _BEFORE * self.met.angle, math.copysign(largest, self.met.angle)
         turns = pairwise((0.0, -near, near, -near, 0.0))
         sweeps = sequence('sweeps', [*(move(a, b, _SWEEP_S) for a, b in turns), hold(_SWEEP_S)])
         push = sequence('push', [sweeps, move(0.0, deep, seconds), hold(_HELD_S, deep)])
         self.begin = sweeps.duration  # of the push, s
-        blocks = round(push.duration / TICK) // BLOCK_TICKS
-        time = TICK * np.arange(blocks * BLOCK_TICKS)
+        blocks = round(push.duration / TICK) // _TICKS
+        time = TICK * np.arange(blocks * _TICKS)
         columns = [sweeps(np.minimum(time, sweeps.duration))] * len(JOINTS)
         columns[self.met.joint] = push(time)
         self.angle, self.velocity = (
@@ -128,13 +132,13 @@ class _Compensator:
 
     def feel(self, force: TipForce) -> None:
         force_n, low, high = (tuple(x.tolist()) for x in (force.force, force.low, force.high))
-        felt = FeltForce(round(force.time * 1e9), force_n, low, high, force.seen)
+        felt = FeltForce(round(force.time * 1e9), force_n, low, high)
         self._stream.contact.feel(felt)
 
     def block(self, begin: int) -> Array:
-        """Shaft angles (BLOCK_TICKS, J) in rad for commands of the hand from one on."""
+        """Shaft angles (_TICKS, J) in rad for commands of the hand from one on."""
         sent = []
-        for k in range(begin, begin + BLOCK_TICKS):
+        for k in range(begin, begin + _TICKS):
             now_ns = self._origin_ns + (k + 1) * _NS_PER_TICK
             asked = (tuple(part[k].tolist()) for part in (self._hand.angle, self._hand.velocity))
             sent.append(self._stream.follow(Command(now_ns, *asked), now_ns, self._measured, True))
@@ -147,7 +151,7 @@ def judged(simulator: str, seed: int) -> Push:
         ready = prepared(simulator, seed)
         hand = _Hand(ready.generator, len(ready.rig.true.joints))
         compensator = _Compensator(ready.plant, hand, ready.later)
-        begins = range(0, len(hand.angle), BLOCK_TICKS)
+        begins = range(0, len(hand.angle), _TICKS)
         free = np.concatenate([compensator.block(begin) for begin in begins])
         guarded, yielded = _guarded(ready, hand, free, seed + 2)
         time, without = _force(ready, hand, free, seed + 2)
@@ -173,12 +177,12 @@ def _guarded(ready: Prepared, hand: _Hand, free: Array, seed: int) -> tuple[Arra
     sent, yielded, felt = np.empty_like(free), math.inf, list[TipForce]()
     foreseen = free
     recording, _ = ready.rig.record(foreseen, seed, hand.met)
-    begins = range(0, len(free), BLOCK_TICKS)
+    begins = range(0, len(free), _TICKS)
     for begin in begins:
         # As in the graph: what came is worked out beside it, and known a block later.
         for force in felt:
             compensator.feel(force)
-        end = begin + BLOCK_TICKS
+        end = begin + _TICKS
         sent[begin:end] = compensator.block(begin)
         if begin * TICK >= hand.begin and yielded == math.inf and compensator.yields:
             yielded = begin * TICK
@@ -203,24 +207,24 @@ def _force(ready: Prepared, hand: _Hand, sent: Array, seed: int) -> tuple[Array,
 
 def print_pushes(rows: Sequence[Push]) -> None:
     """Print the largest forces, and what became of those that the guard can do something about."""
-    limit = shipped_rig().tip.force_limit
-    for title, least in (('all', 0.0), (f'above {limit / AIM:.2f} N without', limit / AIM)):
-        columns = ('pushes', 'without', 'guarded', 'ratio', f'below {AIM}', 'yields after')
-        print(table_head(title, *columns, 'by then', 'too early', 'never'))
-        for simulator in (*SIMULATORS, 'both'):
-            mine = [r for r in rows if simulator in (r.simulator, 'both') and r.without > least]
-            if not mine:
-                continue
-            ratios = [r.ratio for r in mine]
+    limit = shipped_rig().tip.force_limit / AIM
+    columns = ('pushes', 'without', 'guarded', 'ratio', f'below {AIM}', 'yields after')
+    print(table_head('hand', *columns, 'by then', 'too early', 'never'))
+    for fast in (False, True):
+        hand = f'{"above" if fast else "below"} {_FAST:g} rad/s'
+        of_hand = [r for r in rows if (r.speed > _FAST) == fast and r.without > 0.0]
+        strong = [r for r in of_hand if r.without > limit]
+        for title, mine in ((hand, of_hand), (f'{hand}, {limit:.2f} N without', strong)):
             acted = [r for r in mine if 0.0 <= r.late < math.inf]
+            below = sum(r.ratio < AIM for r in mine)
             print(
                 table_row(
-                    simulator,
+                    title,
                     len(mine),
                     _median_and_most([r.without for r in mine], ' N'),
                     _median_and_most([r.guarded for r in mine], ' N'),
-                    _median_and_most(ratios),
-                    f'{np.mean([ratio < AIM for ratio in ratios]):.0%}',
+                    _median_and_most([r.ratio for r in mine]),
+                    f'{below / max(1, len(mine)):.0%}',
                     _median_and_most([r.late for r in acted], ' s'),
                     _median_and_most([r.when_yielding for r in acted], ' N'),
                     sum(r.late < 0.0 for r in mine),

@@ -122,10 +122,10 @@ class CompensatorNode(EndoscopeNode):
     def _on_bounds(self, sample: JointSample) -> None:
         if not sample.effort:
             return
-        x, y, low_x, low_y, high_x, high_y, seen = sample.effort
+        x, y, low_x, low_y, high_x, high_y, _ = sample.effort
         age_ns = max(0, self.ticker.now_ns() - sample.stamp_ns)
         felt_ns = self.ticker.monotonic_ns() - age_ns
-        felt = FeltForce(felt_ns, (x, y), (low_x, low_y), (high_x, high_y), seen == 1.0)
+        felt = FeltForce(felt_ns, (x, y), (low_x, low_y), (high_x, high_y))
         self.stream.contact.feel(felt)
         self._look_at_guard()
 
