@@ -103,7 +103,7 @@ def test_the_guard_is_off_then_watches_then_yields_and_reports_it_at_once(pushed
     level, message, values = reports['pushed'][1]
     assert level == WARN
     assert message.startswith('yielding: bend_y pushes with 0.')
-    assert message.endswith(' N (limit 0.10 N): towards the contact only at 0.5 mm/s')
+    assert message.endswith(' N (limit 0.10 N): towards the contact only at 0.1 mm/s')
     assert (values['state'], values['joints'], values['limit [N]']) == ('yielding', 'bend_y', '0.1')
     felt = dict(zip(BOUNDS, zip(*(s.effort for s in heard), strict=True), strict=True))
     above = next(

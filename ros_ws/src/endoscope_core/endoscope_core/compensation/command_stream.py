@@ -86,7 +86,8 @@ class CommandStream:
         self.corrected = False  # whether a correction is added
         self.cut = RangeCut()
         tip, lever = rig.tip, partial(tip_lever, length=rig.instrument.section_length)
-        self.contact = ContactGuard(JOINTS, tip.force_limit, tip.contact_speed, lever)
+        speeds = tip.contact_speed, tip.release_speed
+        self.contact = ContactGuard(JOINTS, tip.force_limit, *speeds, lever)
         self._law, self._gear, self._resolution = law, facts.gear, shafts.resolution
         self._passing = Feedforward(len(JOINTS), law.feedforward.settings)
         self._desired = DesiredMotion(len(JOINTS))

@@ -109,6 +109,8 @@ class TipFacts:
     force_limit: Annotated[float, within(0.001, 100.0)]  # above which the guard acts
     # Largest speed in m/s at which the tip goes on against a force above the limit.
     contact_speed: Annotated[float, within(1e-5, 1.0)]
+    # And once nothing pushes, until it is where the hand has gone meanwhile.
+    release_speed: Annotated[float, within(1e-5, 1.0)]
     force_alarm: Annotated[float, within(0.001, 100.0)]  # at which the console sounds an alarm
 
 

@@ -62,7 +62,8 @@ class _Joint:
         self.sides = _Side(1.0), _Side(-1.0)
         self.force = 0.0
         self.known_ns: int | None = None
-        self.towards = 0.0  # sign of the motion against a force above the limit
+        self.pushed = 0.0  # sign of the motion against a force that is certain
+        self.towards = 0.0  # and against one above the limit
         self._pressed = 0  # estimates in a row that are certain of that
 
     @property
@@ -82,6 +83,7 @@ class _Joint:
             return  # a force at the limit would be hidden
         before = self.towards if self.is_known(felt.time_ns) else 0.0
         self.known_ns, self.force = felt.time_ns, force
+        self.pushed = -math.copysign(1.0, force) if certain else 0.0
         self.towards = -math.copysign(1.0, force) if abs(force) > limit else 0.0
         if certain and self.towards:
             self._pressed = pressed + 1 if self.towards == before else 1
@@ -96,10 +98,11 @@ class ContactGuard:
 
     A joint yields from `CERTAIN` estimates in a row above `limit` in N whose bounds exclude that
     nothing pushes. As long as it does, motion with the force passes. Against it the joint follows
-    at no more than `speed` in m/s of the tip: above the limit only while the target moves on, below
-    it until it is there. It ends once the force is below the limit and the target no longer ahead,
-    so that the slave does not leap when an obstacle gives way; without any estimate, once the
-    target is back behind what was sent. Otherwise all passes unchanged. Times are monotonic, in ns.
+    at no more than `speed` in m/s of the tip, above the limit only while the target moves on, below
+    it until it is there; where the bounds have nothing push any more, at no more than `release`. It
+    ends once the force is below the limit and the target no longer ahead, so that the slave does
+    not leap when an obstacle gives way; without any estimate, once the target is back behind what
+    was sent. Otherwise all passes unchanged. Times are monotonic, in ns.
 
     `lever` gives the way of the tip in m for a radian at angles (J,) in rad.
     """
@@ -109,9 +112,11 @@ class ContactGuard:
         names: Sequence[str],
         limit: float,
         speed: float,
+        release: float,
         lever: Callable[[Sequence[float]], float],
     ) -> None:
-        self._names, self.limit, self.speed, self._lever = tuple(names), limit, speed, lever
+        self._names, self.limit, self.speed, self.release = tuple(names), limit, speed, release
+        self._lever = lever
         self._joints = [_Joint() for _ in names]
         self._sent: tuple[float, ...] = ()  # rad; empty while nothing is commanded
         self._asked: tuple[float, ...] = (0.0,) * len(self._names)
@@ -162,15 +167,16 @@ class ContactGuard:
         if any(joint.yielding for joint in self._joints):
             # The tip goes on by no more, however many joints do.
             many = math.sqrt(sum(joint.yielding for joint in self._joints))
-            most = self.speed / self._lever(self._sent) * seconds / many
-            sent = tuple(map(self._kept, self._joints, self._sent, asked, [most] * len(asked)))
+            way = seconds / (self._lever(self._sent) * many)
+            sent = tuple(map(self._kept, self._joints, self._sent, asked, [way] * len(asked)))
             if speeds:
                 moved = zip(sent, asked, self._sent, speeds, strict=True)
                 speeds = tuple(v if q == a else (q - b) / seconds for q, a, b, v in moved)
         self._sent, self._asked = sent, asked
         return sent, speeds
 
-    def _kept(self, joint: _Joint, before: float, target: float, most: float) -> float:
+    def _kept(self, joint: _Joint, before: float, target: float, way: float) -> float:
+        """Next angle of a joint; `way` in rad is that of a tip at 1 m/s."""
         known, kept = joint.is_known(self._now_ns), target
         for side in joint.sides:
             moved = side.sign * (target - before)
@@ -178,6 +184,8 @@ class ContactGuard:
                 continue
             eased = known and joint.towards != side.sign
             if moved >= 0.0:
+                released = known and joint.pushed != side.sign
+                most = way * (self.release if released else self.speed)
                 kept = side.move(before, target, most, not eased)
             else:
                 side.deepest = side.sign * target

@@ -31,7 +31,8 @@ TICK_S = 5e-3
 BLOCK_TICKS = 5
 LARGEST_MOMENT = 0.1
 """N m: forty times what the wires of the nominal rig can exert on the joint."""
-_ANGLE_PRECISION, _MOMENT_PRECISION = 1e-5, 1e-6  # rad, N m
+# A hundredth of the bounds of an angle in rad, and N m.
+_ANGLE_PRECISION, _MOMENT_PRECISION = 3e-5, 1e-6
 _FIRST_STEP, _GROWTH, _TRIES = 5e-5, 2.5, 60
 _MOMENT = LOAD.first_parameter
 _KEPT = 0.9
@@ -87,24 +88,33 @@ def _moment_for(
     inputs: Array,
     shaft: Array,
     out: Array,
+    stiffness: Array,
 ) -> float:
-    """Moment in N m that bends the joint to `angle` rad in a block, sought from `first`."""
+    """Moment in N m that bends the joint to `angle` rad in a block, sought from `first`.
+
+    `stiffness` (1,) in N m/rad is about that of the joint, and is found anew.
+    """
     joint = (x, history, sheath, p, on, inputs, shaft, before)
     q = _bent(begin, *joint, first, out)
     low, high, q_low, q_high = first, first, q, q
-    step = _FIRST_STEP
-    while q_high < angle and high < LARGEST_MOMENT:
+    # What was found for another angle of the block, or the one before, is mostly right again.
+    step = max(_FIRST_STEP, stiffness[0] * abs(angle - q))
+    while q_high < angle - _ANGLE_PRECISION and high < LARGEST_MOMENT:
         low, q_low = high, q_high
         high += step
         step *= _GROWTH
         q_high = _bent(begin, *joint, high, out)
-    while q_low > angle and low > -LARGEST_MOMENT:
+    while q_low > angle + _ANGLE_PRECISION and low > -LARGEST_MOMENT:
         high, q_high = low, q_low
         low -= step
         step *= _GROWTH
         q_low = _bent(begin, *joint, low, out)
-    if q_high < angle or q_low > angle:
-        return high if q_high < angle else low
+    if q_high > q_low:
+        stiffness[0] = (high - low) / (q_high - q_low)
+    if q_high < angle + _ANGLE_PRECISION:
+        return high
+    if q_low > angle - _ANGLE_PRECISION:
+        return low
     # The angle rises with the moment: regula falsi as of Illinois (Dowell, Jarratt, BIT 11, 1971).
     moment, side = first, 0
     under, over = q_low - angle, q_high - angle
@@ -190,7 +200,7 @@ class _Follower:
         self._x, self._begin = x[0], x[0].copy()
         self._inputs, self._out = np.zeros(layout.INPUTS), np.empty(layout.OUTPUTS)
         self._rest = (history[0], sheath[0], p[0], flags[0], self._inputs)
-        self._stiffness = p[0, layout.WIRE_STIFFNESS]
+        self._stiffness, self._of_joint = p[0, layout.WIRE_STIFFNESS], np.zeros(1)
         self._path, self._angle = path, float(x[0, layout.TIP])
         self._moment = self._next = 0.0
 
@@ -223,6 +233,6 @@ class _Follower:
 
     def moment_for(self, angle: float, block: Block, first: float | None = None) -> float:
         """The moment in N m that bends the joint to an angle in rad in a block."""
-        joint = (self._begin, self._x, *self._rest, block.shaft, self._out)
+        joint = (self._begin, self._x, *self._rest, block.shaft, self._out, self._of_joint)
         near = self._next if first is None else first
         return _moment_for(angle, self._moment, near, *joint)

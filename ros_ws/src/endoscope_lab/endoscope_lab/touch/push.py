@@ -39,8 +39,10 @@ Array = NDArray[np.float64]
 
 AIM = 0.4
 """Largest force with the guard over that without it."""
-_REACHED_S = (0.5, 5.0)
-"""Range of what a hand takes to where it wants, from a reach in teleoperation to a steady push."""
+WALL = (200.0, 2000.0)
+"""Stiffness of a wall, N/m."""
+_SLOWEST = 0.3
+"""Smallest speed of a hand, largest of the motion, rad/s; it is no faster than it is followed."""
 _PEAK = 1.875
 """Largest speed of a minimum-jerk motion over its mean."""
 _HELD_S = 1.5
@@ -82,17 +84,15 @@ class Push:
 
 
 class _Hand:
-    """All joints sweep before an obstacle, then one is pushed into it and not let go."""
+    """All joints sweep before a wall, then one is pushed into it to its reach, and held there."""
 
     def __init__(self, generator: np.random.Generator, joints: int) -> None:
-        largest = generator.uniform(*motions.REACH)
-        self.met: Obstacle = drawn(generator, np.full(joints, largest))
-        # No faster than a hand is followed.
-        fastest = shipped_rig().joints.hand_speed
-        drawn_s = math.exp(generator.uniform(*np.log(_REACHED_S)))
-        seconds = max(drawn_s, _PEAK * largest / fastest)
-        self.speed = _PEAK * largest / seconds
-        near, deep = _BEFORE * self.met.angle, math.copysign(largest, self.met.angle)
+        rig = shipped_rig().joints
+        largest = np.full(joints, generator.uniform(*motions.REACH))
+        self.met: Obstacle = drawn(generator, largest, WALL)
+        self.speed = math.exp(generator.uniform(*np.log((_SLOWEST, rig.hand_speed))))
+        near, deep = _BEFORE * self.met.angle, math.copysign(rig.reach, self.met.angle)
+        seconds = _PEAK * rig.reach / self.speed
         turns = pairwise((0.0, -near, near, -near, 0.0))
         sweeps = sequence('sweeps', [*(move(a, b, _SWEEP_S) for a, b in turns), hold(_SWEEP_S)])
         push = sequence('push', [sweeps, move(0.0, deep, seconds), hold(_HELD_S, deep)])

@@ -160,13 +160,15 @@ def identified(recording: RigRecording, described: PlantDescription) -> PlantDes
     return replace(described, joints=joints)
 
 
-def drawn(generator: np.random.Generator, largest: Array) -> Obstacle:
-    """Draw an obstacle in the way of a motion with these largest angles (J,) in rad."""
+def drawn(
+    generator: np.random.Generator, largest: Array, stiffness: tuple[float, float] = STIFFNESS
+) -> Obstacle:
+    """Draw an obstacle of so many N/m in the way of a motion to largest angles (J,) in rad."""
     joint = int(generator.integers(len(largest)))
     side = float(generator.choice([-1.0, 1.0]))
     angle = side * generator.uniform(*DEPTH) * float(largest[joint])
     lever = tip_lever([angle], shipped_rig().instrument.section_length)
-    across = math.exp(generator.uniform(*np.log(STIFFNESS)))
+    across = math.exp(generator.uniform(*np.log(stiffness)))
     return Obstacle(joint, angle, across * lever**2)
 
 
