@@ -16,7 +16,6 @@ from functools import cached_property
 from itertools import permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_core.names import JOINTS
 from endoscope_core.physics.description import PlantDescription
@@ -40,9 +39,8 @@ from endoscope_explain.open_questions import (
     open_questions,
 )
 from endoscope_explain.prediction_set import NOTHING, OTHER_NUMBERS, SOMETHING_ELSE
-from endoscope_explain.recording import RigRecording
+from endoscope_explain.recording import Array, RigRecording
 
-Array = NDArray[np.float64]
 Played = Collection[tuple[str, str]]
 """Motions and the joints that they moved."""
 

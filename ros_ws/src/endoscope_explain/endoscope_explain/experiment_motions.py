@@ -5,15 +5,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_core.physics.simulator import TICK
 from endoscope_core.rig import Rig
 from endoscope_core.safety import MotionLimits, MotionShaper
 from endoscope_core.signals import Signal, hold, move, sequence
 from endoscope_core.signals.motions import LOOP, chirp, multisine, ramps, steps_with_holds
-
-Array = NDArray[np.float64]
+from endoscope_explain.recording import Array
 
 SAMPLE_S = 0.01
 SETTLES_S = 1.0

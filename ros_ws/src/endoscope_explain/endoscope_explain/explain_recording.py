@@ -4,7 +4,6 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.layout import IN_OTHER_JOINT
@@ -37,12 +36,11 @@ from endoscope_explain.fit.nominal import (
 )
 from endoscope_explain.observe.observation import JointObservation, observe, with_held_noise
 from endoscope_explain.options import BAND, MOST_EFFECTS
-from endoscope_explain.recording import LEAST_DURATION_S, MOVES_RAD, RigRecording
+from endoscope_explain.recording import LEAST_DURATION_S, MOVES_RAD, Array, RigRecording
 from endoscope_explain.search.levels import JointSearch, search
 from endoscope_explain.search.other_joint import stands_beside
 from endoscope_explain.search.refit import Candidate
 
-Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 SAME_RIG = 0.03

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription, TermSpec
 from endoscope_core.physics.effect import Effect
@@ -15,11 +14,10 @@ from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.places import Place
 from endoscope_explain.prediction_set import (
     OTHER_NUMBERS,
+    Array,
     Contest,
     Posterior,
 )
-
-Array = NDArray[np.float64]
 
 NINETY_PERCENT = 1.645
 """Standard deviations that hold 90 % of a normal distribution, either way."""

@@ -1,14 +1,11 @@
 """What a plant would answer to a motion, and whether that is safe."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.simulator import TICK, simulate
 from endoscope_core.rig import Rig
-from endoscope_explain.recording import RigRecording, Series
-
-Array = NDArray[np.float64]
+from endoscope_explain.recording import Array, RigRecording, Series
 
 
 def answer_to(

@@ -22,7 +22,6 @@ from endoscope_explain.fit.free_parameters import (
 from endoscope_explain.fit.model import (
     Array,
     Fit,
-    Flags,
     JointModel,
     fit,
     joint_of,
@@ -33,7 +32,7 @@ from endoscope_explain.fit.nominal import with_any_numbers
 from endoscope_explain.observe.observation import JointObservation, observe, with_held_noise
 from endoscope_explain.options import BAND
 from endoscope_explain.prediction_set import NOTHING, OTHER_NUMBERS, SOMETHING_ELSE, Contest
-from endoscope_explain.recording import RigRecording
+from endoscope_explain.recording import Mask, RigRecording
 from endoscope_explain.search.screen import background, directions, screened
 from endoscope_explain.search.term import Term, starting_points
 
@@ -158,7 +157,7 @@ def observed(recording: RigRecording, plant: PlantDescription, joint: str) -> Jo
 
 def free_numbers(
     plant: PlantDescription, joint: str, band: float = BAND
-) -> tuple[Array, Flags, tuple[FreeParameter, ...]]:
+) -> tuple[Array, Mask, tuple[FreeParameter, ...]]:
     """Packed parameters and flags of a joint of a plant, and what is free: its effects', too."""
     base, flags = packed_joint(plant, joint)
     free = nominal_parameters(base, band)

@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
@@ -33,12 +32,11 @@ from endoscope_explain.fit.intervals import effect_estimates, nominal_estimates
 from endoscope_explain.fit.model import Fit, joint_of
 from endoscope_explain.fit.solver import Ended
 from endoscope_explain.observe.observation import JointObservation
+from endoscope_explain.recording import Array
 from endoscope_explain.search.formula import fitted_function, nearest_formula
 from endoscope_explain.search.levels import JointSearch
 from endoscope_explain.search.refit import Candidate
 from endoscope_explain.search.term import Term
-
-Array = NDArray[np.float64]
 
 CHANGED = 0.04
 """Relative difference of a nominal parameter that is worth a verdict."""

@@ -4,9 +4,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
 from endoscope_core.workers import parallel_map
 from endoscope_explain.decide.decision import Decision, MissingTerm, decide, share_explained
 from endoscope_explain.fit.evidence import log_evidence
@@ -20,12 +17,10 @@ from endoscope_explain.fit.model import (
     without_effect,
 )
 from endoscope_explain.prediction_set import Contest
+from endoscope_explain.recording import Array, Mask
 from endoscope_explain.search.levels import JointSearch, Level, search
 from endoscope_explain.search.refit import SETTLED, Candidate, candidate
 from endoscope_explain.search.term import Term
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -44,7 +39,7 @@ class GivenPhysics:
 
     terms: tuple[Term, ...]  # in the order in which they were added
     base: Array  # (parameters,)
-    flags: Flags  # (flags,)
+    flags: Mask  # (flags,)
     free: tuple[FreeParameter, ...]  # as in `JointModel`
     theta: Array  # (n,)
     families: tuple[Family, ...] = ()  # as in `JointModel`

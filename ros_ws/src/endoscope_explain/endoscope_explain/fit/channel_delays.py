@@ -9,7 +9,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from endoscope_bags.dataset_card import ChannelDelay
@@ -27,12 +26,11 @@ from endoscope_explain.recording import (
     MOTOR,
     MOVES_RAD,
     WIRES,
+    Array,
     RigRecording,
     motor_name,
     wire_names,
 )
-
-Array = NDArray[np.float64]
 
 DELAY = 'delay_s'
 

@@ -28,6 +28,7 @@ from endoscope_explain.fit.free_parameters import (
 )
 from endoscope_explain.fit.model import Fit, broyden_fit
 from endoscope_explain.observe.observation import JointObservation
+from endoscope_explain.recording import Array
 
 # A fit's misfit is mostly an error of form, not noise: friction along a real sheath has a finer
 # profile than the few terms that are fitted, and a law has finer details than the function that
@@ -36,7 +37,6 @@ from endoscope_explain.observe.observation import JointObservation
 # much it moves the numbers, is what form alone does (a parametric bootstrap over forms: Efron,
 # Tibshirani, An Introduction to the Bootstrap, 1993, ch. 21).
 
-Array = NDArray[np.float64]
 
 STEPS = 8
 """Simulations in which the model is fitted to a rig of another form, whose numbers are its own."""

@@ -29,9 +29,7 @@ from endoscope_explain.fit.model import (
 from endoscope_explain.observe.observation import Channel, JointObservation, StampsOnTicks
 from endoscope_explain.observe.predicted_signals import view
 from endoscope_explain.options import BAND
-from endoscope_explain.recording import RigRecording, signal_name
-
-Array = NDArray[np.float64]
+from endoscope_explain.recording import Array, Mask, RigRecording, signal_name
 
 SPIKE = 8.0
 """Height in noise units of a residual that stands alone."""
@@ -162,7 +160,6 @@ def _corrected(channel: Channel, before: Channel, residual: Array, repeated: boo
 
 ReferenceFits = tuple[Fit, Fit]
 """A joint's nominal plant refitted, and as described."""
-Flags = NDArray[np.bool_]
 
 AT_THE_END = 1e-3
 """Relative distance from the end of a band within which a number counts as being at it."""
@@ -186,7 +183,7 @@ def with_references(
 
 def all_references(
     observations: tuple[JointObservation, ...],
-    packed: dict[str, tuple[Array, Flags]],
+    packed: dict[str, tuple[Array, Mask]],
     jobs: int,
     band: float = BAND,
 ) -> list[ReferenceFits]:
@@ -227,7 +224,7 @@ def simulated_bending(fitted: Fit) -> Array:
 def nominal_references(
     observation: JointObservation,
     base: Array,
-    flags: Flags,
+    flags: Mask,
     band: float = BAND,
 ) -> ReferenceFits:
     """The nominal plant refitted, and as described, each with its derivative."""

@@ -4,7 +4,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_core.errors import InputError
 from endoscope_core.names import JOINTS
@@ -22,8 +21,6 @@ from endoscope_explain.case import NextExperiment
 from endoscope_explain.experiment_motions import SAMPLE_S, as_played
 from endoscope_explain.imagined_motion import answer_to, is_safe
 from endoscope_explain.investigation.log import COMMISSIONING, in_words
-
-Array = NDArray[np.float64]
 
 SHARES = (1.0, 0.75, 0.5, 0.3)
 """Of the commissioning motion's size, the first that is safe."""

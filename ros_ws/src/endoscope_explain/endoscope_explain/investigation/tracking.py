@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_bags import open_bag
 from endoscope_core.errors import NotPlayedError
@@ -20,9 +19,7 @@ from endoscope_explain.experiment_motions import SAMPLE_S, as_played
 from endoscope_explain.investigation import log as logs
 from endoscope_explain.investigation.log import Log, Tracking
 from endoscope_explain.investigation.motions import RigMotion, commissioning, require_allowed
-from endoscope_explain.recording import BENDING, DESIRED
-
-Array = NDArray[np.float64]
+from endoscope_explain.recording import BENDING, DESIRED, Array
 
 HELD_OUT = 'held-out motion'
 FILE = 'held_out.csv'

@@ -3,13 +3,9 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_explain.locate.excess import WINDOW_S, SignalExcess
-from endoscope_explain.recording import RigRecording
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from endoscope_explain.recording import Array, Mask, RigRecording
 
 GRID_S = 0.01
 AFTER_REVERSAL_RAD = 0.15

@@ -8,9 +8,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.observe.predicted_signals import SignalView, view
-from endoscope_explain.recording import RigRecording
-
-Array = NDArray[np.float64]
+from endoscope_explain.recording import Array, RigRecording
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import periodogram, savgol_filter
 
 from endoscope_core.physics.description import PlantDescription
@@ -21,9 +20,7 @@ from endoscope_explain.locate.conditions import conditions, drive, regime_in_wor
 from endoscope_explain.locate.excess import SignalExcess, excess_between, intervals, onset, shares
 from endoscope_explain.observe.observation import JointObservation, observe
 from endoscope_explain.observe.predicted_signals import packed_rig, reading_lead, simulate_rig
-from endoscope_explain.recording import RigRecording
-
-Array = NDArray[np.float64]
+from endoscope_explain.recording import Array, RigRecording
 
 SMOOTHED_S = 0.021
 """Window over which the encoder's steps are smoothed: shorter than the servo's answer."""

@@ -13,13 +13,12 @@ from endoscope_bags.errors import BagError
 from endoscope_bags.message_types import JOINT_STATE
 from endoscope_core.errors import EndoscopeError, nearest
 from endoscope_explain.notebook.arguments import checked
-from endoscope_explain.recording import MOTOR, WIRES
+from endoscope_explain.recording import MOTOR, WIRES, Array
 from endoscope_explain.report.sentences import table
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-Array = NDArray[np.float64]
 
 UNITS = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m'}
 

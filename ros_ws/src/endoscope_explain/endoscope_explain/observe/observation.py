@@ -18,9 +18,15 @@ from endoscope_core.physics.description import PlantDescription, SensorParameter
 from endoscope_core.physics.on_stamps import hold_on_ticks
 from endoscope_core.physics.simulator import TICK
 from endoscope_explain.observe.noise import fast_scatter, rounding_error, step_read
-from endoscope_explain.recording import QUANTITY_UNITS, RigRecording, Series, signal_name
+from endoscope_explain.recording import (
+    QUANTITY_UNITS,
+    Array,
+    Mask,
+    RigRecording,
+    Series,
+    signal_name,
+)
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
@@ -292,8 +298,6 @@ def _channel(
         rounding,
     )
 
-
-Mask = NDArray[np.bool_]
 
 SETTLED_S = 0.4
 """Time after the command's last change from which on a joint is at rest."""

@@ -4,17 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.packing import pack, recording_faults
 from endoscope_explain.explanation import ChannelFit
 from endoscope_explain.observe.observation import JointObservation, observe
 from endoscope_explain.observe.simulated import simulate_joints
-from endoscope_explain.recording import RigRecording
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from endoscope_explain.recording import Array, Mask, RigRecording
 
 
 @dataclass(frozen=True)
@@ -57,7 +53,7 @@ class RecordedView:
 
 def packed_rig(
     observations: tuple[JointObservation, ...], plant: PlantDescription
-) -> tuple[Array, Flags]:
+) -> tuple[Array, Mask]:
     """Parameters (J, parameters) and flags (J, flags) of the recorded joints."""
     parameters, flags = pack(plant)
     rows = [plant.joint_names().index(o.joint) for o in observations]

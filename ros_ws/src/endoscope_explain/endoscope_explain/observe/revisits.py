@@ -11,15 +11,12 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from endoscope_core.physics.layout import IN_COMMAND
 from endoscope_core.physics.simulator import TICK
 from endoscope_explain.observe.observation import JointObservation
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from endoscope_explain.recording import Array, Mask
 
 EVERY_S = 0.02
 """Time between the moments compared."""

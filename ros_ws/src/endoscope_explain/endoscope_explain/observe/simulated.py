@@ -4,21 +4,18 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_core.physics.kernel import run_joints, turn_to
 from endoscope_core.physics.layout import MOTOR_SPEED, OUTPUTS
 from endoscope_core.physics.packing import rest_state
 from endoscope_explain.observe.observation import JointObservation
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from endoscope_explain.recording import Array, Mask
 
 
 def simulate_joints(
     observations: Sequence[JointObservation],
     parameters: Array,
-    flags: Flags,
+    flags: Mask,
     inputs: Array | None = None,
 ) -> Array:
     """Noise-free readings (J, N, OUTPUTS) of joints side by side under recorded, or other, inputs.

@@ -14,11 +14,10 @@ from endoscope_core.physics.simulator import TICK
 from endoscope_explain.case import Mismatch
 from endoscope_explain.locate.excess import WINDOW_S
 from endoscope_explain.observe.predicted_signals import RecordedView, SignalView
+from endoscope_explain.recording import Array
 from endoscope_explain.report.figures import TIME, look
 from endoscope_pages import Curve, Plot, figure_html
 from endoscope_pages.plots import COLUMNS
-
-Array = NDArray[np.float64]
 
 PASSAGE_S = 8.0
 MOST_SIGNALS = 3

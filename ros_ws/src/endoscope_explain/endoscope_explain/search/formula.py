@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from endoscope_core.physics.description import TermSpec
@@ -15,8 +14,7 @@ from endoscope_explain.fit.family import Family
 from endoscope_explain.fit.free_parameters import COORDINATE
 from endoscope_explain.fit.intervals import covariance
 from endoscope_explain.fit.model import Fit
-
-Array = NDArray[np.float64]
+from endoscope_explain.recording import Array
 
 AS_GOOD = 0.95
 """Part of the function's posterior within which a formula is as good as the function."""

@@ -7,17 +7,15 @@ that was fitted stands as it is, and only these have to be looked at again.
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.places import OTHER_ANGLE
+from endoscope_explain.recording import Array
 from endoscope_explain.search.expansion import addable
 from endoscope_explain.search.levels import JointSearch, Level
 from endoscope_explain.search.null_rigs import NEAR
 from endoscope_explain.search.screen import background, directions, gains
 from endoscope_explain.search.term import Term
-
-Array = NDArray[np.float64]
 
 _PLACES = frozenset(place.id for place in FUNCTIONS.values() if place.argument is OTHER_ANGLE)
 

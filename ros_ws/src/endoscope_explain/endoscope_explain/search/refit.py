@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_core.physics.functions.places import NODES
 from endoscope_explain.fit.evidence import (
@@ -25,10 +24,9 @@ from endoscope_explain.fit.free_parameters import COORDINATE
 from endoscope_explain.fit.model import Fit, JointModel, broyden_fit, fit, jacobian
 from endoscope_explain.fit.pooled import fit_together, with_common_numbers
 from endoscope_explain.fit.valleys import out_of_valleys
+from endoscope_explain.recording import Array
 from endoscope_explain.search.left_out import likelihoods
 from endoscope_explain.search.term import Term, states_of
-
-Array = NDArray[np.float64]
 
 FINER = (2 * COEFFICIENTS, 4 * COEFFICIENTS, NODES)
 """Coefficients of finer functions: twice as many each time, up to a value for every node."""

@@ -22,7 +22,7 @@ from endoscope_core.physics.packing import rest_state
 from endoscope_explain.audit.examined import Examined, without_times
 from endoscope_explain.audit.finding import FindingKind, Severity
 from endoscope_explain.observe.observation import ANALYSIS_PERIOD, JointObservation, observe
-from endoscope_explain.observe.predicted_signals import Flags, packed_rig
+from endoscope_explain.observe.predicted_signals import packed_rig
 from endoscope_explain.recording import LEAST_DURATION_S, MOVES_RAD, Array, Mask, RigRecording
 
 NOT_JUDGED = FindingKind(
@@ -91,7 +91,7 @@ class _Past:
     """What one joint's past does to its readings, by the plant as described."""
 
     def __init__(
-        self, observation: JointObservation, packed: Array, on: Flags, seen: float, reach: float
+        self, observation: JointObservation, packed: Array, on: Mask, seen: float, reach: float
     ) -> None:
         self._observation, self._packed, self._on = observation, packed, on
         self._reach = reach
