@@ -23,10 +23,9 @@ from endoscope_core.physics.effects import KNOWN
 from endoscope_core.physics.simulator import TICK
 from endoscope_core.workers import parallel_map
 from endoscope_explain.case import ExplainedCase, NextExperiment
-from endoscope_explain.experiment_motions import SMALLEST, Segment, library
+from endoscope_explain.experiment_motions import SMALLEST, Segment, answer_to, is_safe, library
 from endoscope_explain.explanation import NamedEffect
 from endoscope_explain.fit.model import JointModel, jacobian
-from endoscope_explain.imagined_motion import answer_to, is_safe
 from endoscope_explain.observe.observation import JointObservation, commanded
 from endoscope_explain.observe.revisits import Visited
 from endoscope_explain.open_questions import (

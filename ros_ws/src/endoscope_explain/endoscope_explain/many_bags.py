@@ -15,7 +15,7 @@ from endoscope_explain.case import ExplainedCase, Sources
 from endoscope_explain.pipeline import Progress, explain_case, read_inputs
 from endoscope_explain.report.sentences import terminal_text, verdict_sentence
 from endoscope_explain.report.writing import REPORT_HTML, provenance, write_report
-from endoscope_explain.shared_physics import physics_of_all
+from endoscope_explain.takes import physics_of_all
 
 SUMMARY_CSV = 'summary.csv'
 PARAMETERS_CSV = 'parameters.csv'

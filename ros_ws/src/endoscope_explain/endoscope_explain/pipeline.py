@@ -24,8 +24,7 @@ from endoscope_explain.compare import confirmed_by, ladders
 from endoscope_explain.design import propose, what_is_asked
 from endoscope_explain.explain_recording import Progress, explain_recording
 from endoscope_explain.explanation import Explanation, Verdict
-from endoscope_explain.fit.between_rows import with_command_between_rows
-from endoscope_explain.fit.nominal import with_isolated_marked
+from endoscope_explain.fit.nominal import with_command_between_rows, with_isolated_marked
 from endoscope_explain.locate.locating import (
     cut_at_motor,
     locate_effects,

@@ -10,9 +10,8 @@ from endoscope_explain import design, operator_changes
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.case import ExplainedCase, Inputs, Sources
 from endoscope_explain.design import Asking, propose, what_is_asked
-from endoscope_explain.experiment_motions import library
+from endoscope_explain.experiment_motions import answer_to, is_safe, library
 from endoscope_explain.explanation import Explanation, NamedEffect, Verdict
-from endoscope_explain.imagined_motion import answer_to, is_safe
 from endoscope_explain.observe.observation import commanded
 from endoscope_explain.observe.revisits import Visited
 from endoscope_explain.open_questions import DECIDED, OpenQuestion, fitted_laws, open_questions

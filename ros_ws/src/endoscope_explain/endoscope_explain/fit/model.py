@@ -26,7 +26,7 @@ from endoscope_explain.fit.solver import (
     minimise,
 )
 from endoscope_explain.observe.observation import JointObservation
-from endoscope_explain.observe.simulated import simulate_joints
+from endoscope_explain.observe.predicted_signals import simulate_joints
 from endoscope_explain.recording import Array, Mask
 
 

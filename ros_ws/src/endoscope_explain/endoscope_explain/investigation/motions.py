@@ -18,8 +18,7 @@ from endoscope_core.signals.motions import (
     there_and_back,
 )
 from endoscope_explain.case import NextExperiment
-from endoscope_explain.experiment_motions import SAMPLE_S, as_played
-from endoscope_explain.imagined_motion import answer_to, is_safe
+from endoscope_explain.experiment_motions import SAMPLE_S, answer_to, as_played, is_safe
 from endoscope_explain.investigation.log import COMMISSIONING, in_words
 
 SHARES = (1.0, 0.75, 0.5, 0.3)

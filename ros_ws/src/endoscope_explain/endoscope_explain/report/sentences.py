@@ -7,7 +7,7 @@ from endoscope_core.physics.effects import CATALOGUE, KNOWN
 from endoscope_explain.case import ExplainedCase, Mismatch, changed_parameters
 from endoscope_explain.explanation import NamedEffect, NominalEstimate, Verdict
 from endoscope_explain.recording import axis
-from endoscope_explain.report.left_open import function_of, in_words
+from endoscope_explain.report.left_open import function_of, in_words, visited_once
 from endoscope_explain.report.numbers import (
     PLANTS,
     digits,
@@ -17,7 +17,6 @@ from endoscope_explain.report.numbers import (
     numbers_of,
     shown,
 )
-from endoscope_explain.report.visited_once import visited_once
 
 HEADLINES = {
     Verdict.CONSISTENT: 'Simulation and recording agree',

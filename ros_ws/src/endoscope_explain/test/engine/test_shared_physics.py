@@ -13,7 +13,7 @@ from endoscope_explain.observe.observation import observe
 from endoscope_explain.search.null_rigs import null_of_several, shown
 from endoscope_explain.search.screen import background, directions
 from endoscope_explain.search.term import Term, effects, with_effect
-from endoscope_explain.shared_physics import shared_effects
+from endoscope_explain.takes import shared_effects
 
 pytestmark = pytest.mark.nightly
 
