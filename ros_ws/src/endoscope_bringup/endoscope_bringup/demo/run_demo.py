@@ -11,10 +11,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from endoscope_bringup.demo.analysis import analyse
 from endoscope_bringup.demo.procedure import TUBES, RecordedTube, Tube
 from endoscope_bringup.demo.report_page import report_page
-from endoscope_bringup.demo.results import DemoResults, table_rows
+from endoscope_bringup.demo.results import DemoResults, analyse, table_rows
 from endoscope_core.atomic_output import write_text
 from endoscope_core.workers import worker_pool
 
