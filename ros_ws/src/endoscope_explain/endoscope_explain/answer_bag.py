@@ -118,10 +118,7 @@ class BagCommands:
 
 
 def commands_of_bag(recording: Recording, plant: PlantDescription, rig: Rig) -> BagCommands:
-    """Shaft commands of a bag, or desired angles times the gear.
-
-    InputError without either, and where one turns a shaft further than the rig lets it.
-    """
+    """Shaft commands of a bag, or desired angles times the gear; InputError if none can be used."""
     topic = input_topic(recording)
     if not topic:
         raise InputError(recording.lacking(COMMAND, DESIRED))
@@ -174,17 +171,11 @@ def write_answer(
     noise_seed: int | None = None,
     rig: Rig | None = None,
 ) -> int:
-    """Write the answer of a plant to the commands of a recording; return the number of messages.
-
-    The new bag has the commands as they are, `motor/measured_js`, `wires/measured_js` and
-    `slave/measured_js` at the stamps, under the namespace and with the times of receipt of the
-    recording, and states on `rig/kind` that it was simulated; a topic that the recording lacks
-    comes at its nominal rate. Only joints that are commanded answer. Where the recording has
-    `tracker/measured_cp`, the answer has it too, at the stamps that it shares with
-    `slave/measured_js`. Without a seed there is neither noise nor quantisation. InputError,
-    BagError or FileError if the recording has no usable commands, its rig cannot be read, or `out`
-    exists.
-    """
+    """Write a bag with the answer of a plant to the commands of a recording; how many messages."""
+    # It has the commands as they are and what is measured at the stamps, under the namespace and
+    # with the times of receipt of the recording; a topic that the recording lacks comes at its
+    # nominal rate. Only joints that are commanded answer. Poses are at the stamps that they share
+    # with `slave/measured_js`. Without a seed there is neither noise nor quantisation.
     rig = rig or rig_of_bag(recording)
     commands = commands_of_bag(recording, plant, rig)
     driven = plant.of_joints(commands.joints)

@@ -45,10 +45,7 @@ class Segment:
 
 
 def as_played(time: Array, angle: Array, rig: Rig, tick: float = TICK) -> tuple[Array, Array]:
-    """A motion (N, J) in rad at times (N,) as the console plays it: within a rig's limits.
-
-    It is shaped every `tick` s; the console does so every ms.
-    """
+    """A motion (N, J) in rad at times (N,) as the console plays it: within a rig's limits."""
     shaper = MotionShaper(_limits(rig, angle.shape[1]))
     ticks = np.arange(time[0], time[-1] + SETTLES_S, tick)
     wanted = np.stack([np.interp(ticks, time, column) for column in angle.T], axis=1)
@@ -67,12 +64,9 @@ def _limits(rig: Rig, joints: int) -> MotionLimits:
 # The same for every question about a rig.
 @lru_cache(maxsize=32)
 def library(joint: str, reaches: tuple[tuple[str, float], ...], rig: Rig) -> tuple[Segment, ...]:
-    """Motions of one of a rig's joints, each up to its reach in rad, as the rig plays them.
-
-    Where there are two joints that move, the other one is moved alone, too, and stands bent
-    meanwhile. Empty where the joint hardly moves; motions that the rig is too slow for are left
-    out.
-    """
+    """Motions of one of a rig's joints, each up to its reach in rad, as the rig plays them."""
+    # Where there are two joints that move, the other one is moved alone, too, and stands bent
+    # meanwhile. None where the joint hardly moves, and none that the rig is too slow for.
     joints, most = tuple(name for name, _ in reaches), dict(reaches)
     if most[joint] < LEAST_REACH:
         return ()
@@ -190,10 +184,7 @@ def is_safe(
     bending_limit: float | Array,
     slack_limit: float | Array = 0.0,
 ) -> bool:
-    """Whether an imagined motion stays within tensions in N and angles in rad.
-
-    Limits are of all, or of each joint (J,) and its two wires (J, 2).
-    """
+    """Whether an imagined motion stays within tensions in N, (J, 2), and angles in rad, (J,)."""
     assert recording.tension is not None
     return bool(
         np.all(recording.tension.values <= tension_limit)

@@ -70,10 +70,8 @@ def explain_recording(
     jobs: int = 2,
     progress: Progress | None = None,
 ) -> Explanation:
-    """Explain why a recording differs from the simulation of a plant.
-
-    What is `known` of a joint, names from other recordings of the rig, is fitted in any case.
-    """
+    """Explain why a recording differs from the simulation of a plant."""
+    # What is `known` of a joint, names from other recordings of the rig, is fitted in any case.
     report = progress or (lambda _: None)
     observations = tuple(o for o in with_held_noise(observe(recording, plant)) if o.channels)
     if not _is_enough(observations):

@@ -62,11 +62,9 @@ class OpenQuestion:
     def brings(
         self, apart: Mapping[tuple[str, str], float], duration: float
     ) -> tuple[float, float]:
-        """Evidence that a motion of `duration` s is expected to bring, in nats as it is read.
-
-        `apart` is the evidence in nats of a law that is true over another one. Also, per second,
-        what of it brings the true one no further than `DECIDED`.
-        """
+        """Evidence in nats, as it is read, expected of a motion of `duration` s, and per second."""
+        # `apart` is the evidence in nats of a law that is true over another one. Per second counts
+        # what of it brings the true one no further than `DECIDED`.
         temperature = self.temperature(duration)
         whole = useful = 0.0
         total = sum(self.chances.values())
@@ -105,10 +103,8 @@ def _chances(contest: Contest, named: str) -> dict[str, float]:
 
 
 def fitted_laws(case: ExplainedCase, question: OpenQuestion) -> dict[str, PlantDescription]:
-    """A plant of each law that can be simulated, fitted to the recordings, by its name.
-
-    Without what was named there is nothing to compare: empty where the improved plant lacks it.
-    """
+    """A plant of each law that can be simulated, fitted to the recordings, by its name."""
+    # Without what was named there is nothing to compare: empty where the improved plant lacks it.
     plant = case.explanation.augmented
     named, joint = next(iter(question.chances)), question.joint
     there = {spec.id for spec in plant.effects if spec.joint == joint}

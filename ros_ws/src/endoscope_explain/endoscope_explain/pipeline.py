@@ -11,7 +11,6 @@ from endoscope_bags.errors import BagError
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit import AuditReport, audit_recording
 from endoscope_explain.case import (
-    ChainCut,
     ExplainedCase,
     Inputs,
     Mismatch,
@@ -127,7 +126,8 @@ def explain_case(
         plant=with_unrecorded(plant, sources.plant),
         ladder={},
     )
-    case = replace(case, places=_places(case), cuts=_cuts(case))
+    cuts = cut_at_motor(case.recording, explanation.refitted) if explanation.fit else ()
+    case = replace(case, places=_places(case), cuts=cuts)
     if answered is not None:
         answered(case)
     if explanation.fit and not sources.quick:
@@ -135,11 +135,6 @@ def explain_case(
         case = replace(case, next_experiment=propose(case, what_is_asked(case), sources.jobs))
     held_out, second = ladders(explanation, validation)
     return replace(case, ladder=held_out, validation=second, runtime_s=time.monotonic() - begun)
-
-
-def _cuts(case: ExplainedCase) -> tuple[ChainCut, ...]:
-    fitted = case.explanation.fit
-    return cut_at_motor(case.recording, case.explanation.refitted) if fitted else ()
 
 
 def _places(case: ExplainedCase) -> tuple[Mismatch, ...]:

@@ -247,12 +247,9 @@ def recording_from_bag(
     namespace: str | None = None,
     rig: Rig | None = None,
 ) -> RigRecording:
-    """Read what analysis needs from a bag, in the order in which it was recorded.
-
-    It has the joints of the plant that all topics have, and notes of what is missing. Topics of
-    `without`, some of `WAIVABLE`, may be missing. BagError if the bag or its stamps cannot be used,
-    FileError if the rig that it carries cannot be read.
-    """
+    """What analysis needs of a bag, in the order in which it was recorded; BagError if unusable."""
+    # It has the joints of the plant that all topics have, and notes of what is missing. Topics of
+    # `without`, some of `WAIVABLE`, may be missing.
     bag = open_bag(path)
     rig = rig or rig_of_bag(bag)
     lacking = [t for t in (WIRES, BENDING, MOTOR) if not bag.has(t, namespace)]

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from endoscope_core.physics.description import PlantDescription
-from endoscope_explain.audit import audit_recording
-from endoscope_explain.audit.auditing import KINDS
+from endoscope_explain.audit import KINDS, audit_recording
 from endoscope_explain.audit.findings import (
     clock_rate,
     earlier_motion,

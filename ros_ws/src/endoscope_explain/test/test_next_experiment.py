@@ -278,7 +278,7 @@ def test_a_number_that_is_not_known_any_more_leaves_the_others_less_known(asking
     names = [item.name for item in law.model.free]
     k = names.index('capstan_exponent')
     before = np.linalg.inv(law.precision)
-    changed = law.once(lambda plant: plant, 'capstan_exponent')
+    changed = law.once(lambda plant, joint: plant, 'capstan_exponent')
     after = np.linalg.inv(changed.precision)
     others = [i for i in range(len(names)) if i != k]
     np.testing.assert_allclose(

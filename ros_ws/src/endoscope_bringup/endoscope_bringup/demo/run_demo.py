@@ -32,11 +32,9 @@ def run_demo(
     real_time: bool,
     progress: Callable[[str], None],
 ) -> DemoResults:
-    """Run the procedure on every tube; bags, plants, figures and report go into an existing folder.
-
-    The same seed of the sensors' noise gives the same bags, unless `real_time` runs by the wall
-    clock instead of in lock-step on /clock. `progress` must be picklable.
-    """
+    """Run the procedure on every tube; all that is written goes into an existing folder."""
+    # The same seed of the sensors' noise gives the same bags, unless `real_time` runs by the wall
+    # clock instead of in lock-step on /clock. `progress` must be picklable.
     began = time.monotonic()
     recordings = _run_tubes(folder, tubes, seed, real_time, progress)
     progress('reading the recordings back and drawing the report')

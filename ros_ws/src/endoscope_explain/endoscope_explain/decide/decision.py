@@ -184,10 +184,8 @@ def _named_as_chosen(
 def _contest(
     level: Level, terms: tuple[Term, ...], first: tuple[str, Candidate] | None = None
 ) -> Contest:
-    """What was tried at a level beside some terms.
-
-    `first` is the name that was chosen, with the candidate that has it; None where none was.
-    """
+    """What was tried at a level beside some terms."""
+    # `first` is the name that was chosen, with the candidate that has it; None where none was.
     beside = level.beside(terms)
     tried: dict[str, Candidate] = {}
     formulas = {more.id for more, _ in beside}

@@ -54,18 +54,8 @@ CHI_SQUARED_90 = 2.706
 def channel_delays(
     recording: RigRecording, plant: PlantDescription, jobs: int = 2
 ) -> tuple[ChannelDelay, ...]:
-    """Return the delay of every measured channel, or why it is unknown.
-
-    Parameters
-    ----------
-    recording : RigRecording
-        As audited.
-    plant : PlantDescription
-        With the joints of the recording; its effects are in force, and delays among them are where
-        the fit begins.
-    jobs : int
-        Parallel tasks.
-    """
+    """The delay of every measured channel of an audited recording, or why it is unknown."""
+    # The plant's effects are in force, and delays among them are where the fit begins.
     shafts = _shafts(recording)
     moved = np.ptp(recording.command.values, axis=0)
     why = {
@@ -156,10 +146,8 @@ def _shafts(recording: RigRecording) -> list[ChannelDelay | None]:
 def shift_after(
     command_time: Array, command: Array, time: Array, value: Array
 ) -> tuple[float, float, float] | None:
-    """Shift in s at which values (N,) follow a held command (M,) best, with its 90 % interval.
-
-    None where shifts apart from each other do so equally well, as in the middle of a sine.
-    """
+    """Shift in s at which values (N,) follow a held command (M,) best, with its 90 % interval."""
+    # None where shifts apart from each other do so equally well, as in the middle of a sine.
     shifts = np.arange(0.0, LONGEST_S + STEP_S, STEP_S)
     judged = time >= command_time[0] + LONGEST_S
     time, value = time[judged], value[judged]

@@ -59,13 +59,12 @@ class RigMotion:
 
 
 def first_motion() -> dict[str, Signal]:
-    """Wide strokes, a chirp, the strokes again with a hold and a small loop, and steps, by joint.
-
-    28 s and a rest of 1 s, about half as long as `signals.commissioning_motion`, as what it leaves
-    open is asked for by the next one. Its strokes of 140 deg are 40 deg wider than the backlash of
-    the worst class, and come again in its second half, which is what is held out. `bend_y` begins
-    once `bend_x` has moved alone, so that whatever appears on it meanwhile is coupling.
-    """
+    """Wide strokes, a chirp, the strokes again with hold and small loop, and steps, by joint."""
+    # 28 s and a rest of 1 s, about half as long as `signals.commissioning_motion`, as what it
+    # leaves open is asked for by the next one. Its strokes of 140 deg are 40 deg wider than the
+    # backlash of the worst class, and come again in its second half, which is what is held out.
+    # `bend_y` begins once `bend_x` has moved alone, so that whatever appears on it meanwhile is
+    # coupling.
     # Rounded corners take 2 deg.
     reach = math.radians(72.0)
     speed = 1.1 * reach
@@ -79,10 +78,7 @@ def first_motion() -> dict[str, Signal]:
 
 
 def commissioning(plant: PlantDescription, rig: Rig) -> RigMotion:
-    """The commissioning motion as large as the rig's limits and the described plant allow.
-
-    MotionRefusedError if the described plant answers it beyond them at any size.
-    """
+    """The commissioning motion as large as is allowed; MotionRefusedError if it is at no size."""
     motion = first_motion()
     time = np.arange(0.0, max(signal.duration for signal in motion.values()), SAMPLE_S)
     whole = np.stack(

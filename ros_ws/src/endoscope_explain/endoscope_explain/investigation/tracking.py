@@ -70,10 +70,7 @@ def held_out(plant: PlantDescription, rig: Rig) -> RigMotion:
 def with_tracking(
     log: Log, folder: Path, plant_file: Path, motion: RigMotion, rig: Rig, play: PlayThrough
 ) -> Log:
-    """The log with how the tip follows a motion by the described and by the improved plant.
-
-    Where that was not wanted or refused, the log notes it. RigStoppedError if the rig stops.
-    """
+    """The log with how the tip follows by the described and by the improved plant, or why not."""
     require_allowed(motion, rig)
     write_command_file(folder / FILE, motion.table.time, motion.table.angle, JOINTS)
     found: tuple[Tracking, ...] = ()
@@ -89,10 +86,7 @@ def with_tracking(
 
 
 def tracked(bag: Path, file: Path) -> Tracked:
-    """What a bag has of a motion that a file asks for, by the time of the file, once led into.
-
-    BagError if it cannot be read.
-    """
+    """What a bag has of a motion that a file asks for, by the time of the file, once led into."""
     opened, table = open_bag(bag), read_command_file(file)
     stream, tip = (opened.joint_state(topic).select(JOINTS) for topic in (DESIRED, BENDING))
     stamp_s = 1e-9 * (stream.stamp_ns - stream.stamp_ns[0])

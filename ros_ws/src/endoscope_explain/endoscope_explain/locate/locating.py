@@ -1,15 +1,12 @@
 """Where a mismatch is: stage, signals, time, state and frequency."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from scipy.signal import periodogram, savgol_filter
 
 from endoscope_core.physics.description import PlantDescription
-from endoscope_core.physics.effects import describe
 from endoscope_core.physics.layout import IN_MOTOR
-from endoscope_core.physics.packing import without_functions
 from endoscope_core.physics.simulator import TICK
 from endoscope_explain.audit import Finding
 from endoscope_explain.case import ChainCut, Mismatch, changed_parameters
@@ -20,6 +17,7 @@ from endoscope_explain.locate.conditions import conditions, drive, regime_in_wor
 from endoscope_explain.locate.excess import SignalExcess, excess_between, intervals, onset, shares
 from endoscope_explain.observe.observation import JointObservation, observe
 from endoscope_explain.observe.predicted_signals import packed_rig, reading_lead, simulate_rig
+from endoscope_explain.open_questions import without
 from endoscope_explain.recording import Array, RigRecording
 
 SMOOTHED_S = 0.021
@@ -93,7 +91,7 @@ def locate_effects(
     # the measurement then has in excess is that effect's trace.
     located = []
     for effect in effects:
-        rest = _without(plant, effect)
+        rest = without(plant, effect)
         if rest == plant:
             continue
         found = excess_between(recording, rest, plant)
@@ -101,14 +99,6 @@ def locate_effects(
         began = None if time is None else time.value
         located.append(place(recording, found, effect.stage, effect.joint, began))
     return located
-
-
-def _without(plant: PlantDescription, effect: NamedEffect) -> PlantDescription:
-    """The plant without an effect, or without the function by which the plant has it."""
-    here = effect.id, effect.joint
-    if any((e.id, e.joint) == here for e in plant.effects):
-        return replace(plant, effects=tuple(e for e in plant.effects if (e.id, e.joint) != here))
-    return without_functions(plant, effect.joint, describe(effect.id).traits.families)
 
 
 def locate_unknown(recording: RigRecording, explanation: Explanation) -> list[Mismatch]:

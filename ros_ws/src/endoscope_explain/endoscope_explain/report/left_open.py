@@ -13,8 +13,8 @@ from endoscope_explain.report.numbers import moving_joints
 
 
 def in_words(left: Posterior) -> str:
-    """Names of a set with their probabilities, the likeliest first."""
-    return _any(_statement(names, p) for names, p in left.items())
+    """Names of a set with their probabilities, the likeliest first; empty where there are none."""
+    return _any(_statement(names, p) for names, p in left.items()) if left else ''
 
 
 def _statement(names: Sequence[str], probability: float) -> str:

@@ -62,7 +62,8 @@ def state_of(
 def telling_signals(recorded: RecordedView, joint: str) -> tuple[SignalView, ...]:
     """Signals of a joint in which the best plant gains most on the described one."""
     views = recorded.of_joint(joint)
-    described, best = ends_of(views[0])
+    plants = list(views[0].predicted)
+    described, best = plants[0], plants[-1]
     if described == best:
         # There is nothing to gain: angle and tensions are shown.
         chosen = [v for v in views if v.quantity in ('bending', 'tension')]
@@ -137,12 +138,6 @@ def passage_figure(views: tuple[SignalView, ...], over: Axis, passage: tuple[flo
             ),
         ]
     return figure_html(loops + signals)
-
-
-def ends_of(one: SignalView) -> tuple[str, str]:
-    """Names of the described plant and of the best one."""
-    names = list(one.predicted)
-    return names[0], names[-1]
 
 
 def _curves(one: SignalView, inside: NDArray[np.bool_]) -> list[tuple[str, Array, float]]:

@@ -234,10 +234,7 @@ PLANT_YAML = 'plant.yaml'
 
 
 def write_report(case: ExplainedCase, folder: Path) -> dict[str, Any]:
-    """Write report.json, report.html, plant.yaml and any next motion to a folder that exists.
-
-    Returns what report.json contains.
-    """
+    """Write report.json, whose content it returns, report.html, plant.yaml and any next motion."""
     content = report_mapping(case)
     text = json.dumps(content, indent=1, allow_nan=False)
     (folder / REPORT_JSON).write_text(text + '\n', encoding='utf-8')

@@ -41,10 +41,8 @@ class Pair:
 def better_pair(
     base: Screened, found: Sequence[Candidate], jobs: int
 ) -> tuple[Parent, Candidate] | None:
-    """A pair that has more evidence than all found, and its first term alone; None for no such one.
-
-    `base` is the screen of the candidate that `found` has two terms more than, of one recording.
-    """
+    """A pair with more evidence than all found, and its first term alone; None without one."""
+    # `base` is the screen of the candidate that `found` has two terms more than, of one recording.
     best = max(found, key=lambda c: c.evidence, default=None)
     if best is None or best.is_noise:
         return None

@@ -19,7 +19,7 @@ from endoscope_explain.fit.evidence import (
     log_evidence,
     weights,
 )
-from endoscope_explain.fit.family import COEFFICIENTS, Family, visited_range
+from endoscope_explain.fit.family import COEFFICIENTS, visited_range
 from endoscope_explain.fit.free_parameters import COORDINATE
 from endoscope_explain.fit.model import Fit, JointModel, broyden_fit, fit, jacobian
 from endoscope_explain.fit.pooled import fit_together, with_common_numbers
@@ -177,7 +177,10 @@ def refined(one: Candidate, without: Fit, offset: Array) -> Candidate:
         assert term.family is not None
         before = best.fit.model.family_at(-1, best.fit.theta)
         # With what was missing, the joint goes further than it did without.
-        visited = (before.low, before.high) if before.repeats else _visited(best.fit, before)
+        visited = before.low, before.high
+        if not before.repeats:
+            tick = best.fit.model.observation.tick
+            visited = visited_range(before.place, states_of(best.fit), tick, before.lag)
         finer = replace(term, family=before.finer(count, visited))
         assert finer.family is not None
         model = finer.added_to(without.model)
@@ -196,12 +199,6 @@ def refined(one: Candidate, without: Fit, offset: Array) -> Candidate:
         if found.model.offset is not None:
             offset = found.model.offset
     return best
-
-
-def _visited(found: Fit, family: Family) -> tuple[float, float]:
-    """Range of a family's argument along a fit."""
-    tick = found.model.observation.tick
-    return visited_range(family.place, states_of(found), tick, family.lag)
 
 
 def _twice(model: JointModel, offset: Array | None, theta: Array, weight: Array) -> Fit:

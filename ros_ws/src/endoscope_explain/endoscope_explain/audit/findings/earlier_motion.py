@@ -47,10 +47,8 @@ FLIGHT = np.array([1e-3, 0.1])
 
 
 def find(seen: Examined) -> Examined:
-    """Estimate from where the motors had come when a recording began, as its `start`.
-
-    The time until it no longer shows by more than the noise is left out, as long as enough is left.
-    """
+    """Estimate as its `start` from where the motors had come when a recording began."""
+    # The time until it no longer shows by more than the noise is left out, if enough is left.
     recording = seen.recording
     observations = observe(recording, seen.plant)
     parameters, flags = packed_rig(observations, seen.plant)
