@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from endoscope_explain.audit.finding import AuditReport, Finding
+from endoscope_explain.audit.finding import AuditReport
 from endoscope_explain.case import Inputs, Sources
 from endoscope_explain.decide.decision import found_together
 from endoscope_explain.decide.given_physics import (
@@ -26,7 +26,7 @@ from endoscope_explain.fit.nominal import ReferenceFits, with_references
 from endoscope_explain.fit.pooled import judged_alone
 from endoscope_explain.observe.observation import observe, with_held_noise
 from endoscope_explain.pipeline import read_inputs, refuse_other_joints
-from endoscope_explain.recording import Array, Restart, RigRecording, Series
+from endoscope_explain.recording import Restart, RigRecording, Series
 from endoscope_explain.search.levels import search
 
 APART_S = 1.0
@@ -46,7 +46,11 @@ def inputs_joined(inputs: Sequence[Inputs]) -> Inputs:
         )
     later = _later_by(recordings)
     findings = [
-        _of_a_take(finding, one.audit.recording.name, by)
+        replace(
+            finding,
+            text=f'{one.audit.recording.name}: {finding.text}',
+            intervals=tuple((begin + by, end + by) for begin, end in finding.intervals),
+        )
         for one, by in zip(inputs, later, strict=True)
         for finding in one.audit.findings
     ]
@@ -68,7 +72,11 @@ def recordings_joined(recordings: Sequence[RigRecording]) -> RigRecording:
         command=_one_after_another([recording.command for recording in recordings], later),
         notes=tuple(dict.fromkeys(note for one in recordings for note in one.notes)),
         restarts=tuple(
-            Restart(float(one.command.time[0]) + by, _way(one), _speed(one))
+            Restart(
+                float(one.command.time[0]) + by,
+                one.command.values[0][:, None] if one.start is None else one.start,
+                np.zeros(len(one.joints)) if one.start_speed is None else one.start_speed,
+            )
             for one, by in zip(recordings[1:], later[1:], strict=True)
         ),
         tension=None,
@@ -99,21 +107,6 @@ def _one_after_another(parts: Sequence[Series], later: Sequence[float]) -> Serie
         np.concatenate([part.values for part in parts]),
         np.concatenate([part.valid for part in parts]),
     )
-
-
-def _way(recording: RigRecording) -> Array:
-    return recording.command.values[0][:, None] if recording.start is None else recording.start
-
-
-def _speed(recording: RigRecording) -> Array:
-    if recording.start_speed is None:
-        return np.zeros(len(recording.joints))
-    return recording.start_speed
-
-
-def _of_a_take(finding: Finding, name: str, by: float) -> Finding:
-    intervals = tuple((begin + by, end + by) for begin, end in finding.intervals)
-    return replace(finding, text=f'{name}: {finding.text}', intervals=intervals)
 
 
 def physics_of_all(sources: Sequence[Sources], report: Callable[[str], None]) -> list[GivenJoints]:

@@ -1,10 +1,8 @@
 """What is wrong with a recording itself, before anything is explained from it."""
 
-from typing import Protocol
-
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit.examined import Examined
-from endoscope_explain.audit.finding import AuditReport, Finding, FindingKind, Severity
+from endoscope_explain.audit.finding import AuditReport, Finding, Severity
 from endoscope_explain.audit.findings import (
     clock_rate,
     earlier_motion,
@@ -25,14 +23,7 @@ from endoscope_explain.recording import RigRecording
 __all__ = ['AuditReport', 'Finding', 'Severity', 'audit_recording']
 
 
-class Step(Protocol):
-    """A module of `findings`."""
-
-    def find(self, seen: Examined) -> Examined:
-        """Find what is wrong, and put it right."""
-
-
-STEPS: tuple[Step, ...] = (
+STEPS = (
     stamp_order,
     stamp_unit,
     stamp_jitter,
@@ -47,11 +38,7 @@ STEPS: tuple[Step, ...] = (
     stray_poses,
     earlier_motion,
 )
-"""Each needs what those before it have put right."""
-KINDS = tuple(
-    kind for step in STEPS for kind in vars(step).values() if isinstance(kind, FindingKind)
-)
-"""Of all findings."""
+"""Each finds what is wrong and puts it right; it needs what those before it have put right."""
 
 
 def audit_recording(recording: RigRecording, plant: PlantDescription) -> AuditReport:

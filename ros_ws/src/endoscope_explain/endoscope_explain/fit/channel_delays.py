@@ -91,10 +91,10 @@ def _of_joint(refitted: Fit, quantities: Sequence[str], jobs: int) -> list[Chann
     # More than noise is left, and more than another form leaves, or numbers at an end of theirs.
     if late.beyond_form and (late.beyond_form > 1.0 or is_at_tolerance(late)):
         return _unknown(joint, quantities, 'the plant does not explain this recording')
-    numbers, result = intervals(late), []
+    numbers, result = {each.index: each for each in intervals(late)}, []
     for quantity in quantities:
-        at = numbers.indices.index(EFFECTS[quantity].first_parameter)
-        value, low, high = (float(v[at]) for v in (numbers.values, numbers.low, numbers.high))
+        late_by = numbers[EFFECTS[quantity].first_parameter]
+        value, low, high = late_by.value, late_by.low, late_by.high
         if high >= LONGEST_S:
             result += _unknown(joint, [quantity], f'not limited to less than {LONGEST_S:g} s')
         else:

@@ -8,7 +8,6 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2, t
 
 from endoscope_core.physics.description import NUMBERS
@@ -113,17 +112,16 @@ TOGETHER = math.sqrt(0.75)
 
 
 @dataclass(frozen=True)
-class Intervals:
-    """90 % intervals of a fit's free parameters."""
+class Interval:
+    """90 % interval of a free parameter of a fit."""
 
-    names: tuple[str, ...]
-    indices: tuple[int, ...]  # places in the packed parameters
-    values: Array  # (n,)
-    low: Array  # (n,)
-    high: Array  # (n,)
-    shown: NDArray[np.bool_]  # (n,), whether the recording shows more of it than the prior
-    # Number without which the recording does not show this one; empty where it does.
-    partners: tuple[str, ...]
+    name: str
+    index: int  # place in the packed parameters
+    value: float
+    low: float
+    high: float
+    shown: bool  # whether the recording shows more of it than the prior
+    partner: str  # number without which the recording does not show this one; empty where it does
 
 
 def covariance(fit: Fit) -> Array:
@@ -142,7 +140,7 @@ def _with_form(spread: Array, fit: Fit) -> Array:
     return np.asarray(spread + scale**2 * fit.moved_by_form)
 
 
-def intervals(fit: Fit) -> Intervals:
+def intervals(fit: Fit) -> list[Interval]:
     """90 % intervals of a fit, within the parameters' bounds."""
     kept = [k for k, item in enumerate(fit.model.free) if item.index != COEFFICIENT]
     free = [fit.model.free[k] for k in kept]
@@ -159,19 +157,19 @@ def intervals(fit: Fit) -> Intervals:
     nearest = np.where(bound, correlation, 0.0).argmax(axis=1)
     partners = (free[n].name if bound[k, n] else '' for k, n in enumerate(nearest))
     reach *= INTERVAL_WIDTH
-
-    def values(coordinates: Array) -> Array:
-        return np.array([item.value(c) for item, c in zip(free, coordinates, strict=True)])
-
-    return Intervals(
-        tuple(item.name for item in free),
-        tuple(item.index for item in free),
-        values(theta),
-        values(theta - reach),
-        values(theta + reach),
-        shown,
-        tuple(partners),
-    )
+    numbers = zip(free, theta.tolist(), reach.tolist(), shown.tolist(), partners, strict=True)
+    return [
+        Interval(
+            item.name,
+            item.index,
+            float(item.value(at)),
+            float(item.value(at - by)),
+            float(item.value(at + by)),
+            seen,
+            partner,
+        )
+        for item, at, by, seen, partner in numbers
+    ]
 
 
 def may_be_absent(fit: Fit, effect: Effect) -> bool:
@@ -197,51 +195,35 @@ def nominal_estimates(
     fit: Fit, described: Array, units: dict[str, str]
 ) -> dict[str, NominalEstimate]:
     """Estimates of the nominal parameters of a fit, beside those described (parameters,)."""
-    found, ends = intervals(fit), fit.at_bounds()
+    ends, estimates = fit.at_bounds(), {}
     absent = {place for each in lacking(described) for place in each.places}
-    return {
-        name: NominalEstimate(
-            float(value),
-            float(low),
-            float(high),
-            units.get(name, ''),
-            float(described[index]),
-            _in_band(name, float(value), float(described[index])),
-            bool(shown),
-            partner,
-            name in ends,
-        )
-        for name, index, value, low, high, shown, partner in zip(
-            found.names,
-            found.indices,
-            found.values,
-            found.low,
-            found.high,
-            found.shown,
-            found.partners,
-            strict=True,
-        )
-        if name in FITTED_NOMINAL and index not in absent
-    }
-
-
-def _in_band(name: str, value: float, described: float) -> bool:
-    low, high = tolerance(name, described)
-    return low <= value <= high
+    for each in intervals(fit):
+        if each.name in FITTED_NOMINAL and each.index not in absent:
+            nominal = float(described[each.index])
+            low, high = tolerance(each.name, nominal)
+            estimates[each.name] = NominalEstimate(
+                each.value,
+                each.low,
+                each.high,
+                units.get(each.name, ''),
+                nominal,
+                low <= each.value <= high,
+                each.shown,
+                each.partner,
+                each.name in ends,
+            )
+    return estimates
 
 
 def effect_estimates(fit: Fit, first: int, units: dict[str, str]) -> dict[str, Estimate]:
     """Estimates of one effect's parameters: those named in `units`, from packed index `first`."""
-    found = intervals(fit)
+    found = {each.index: each for each in intervals(fit)}
     packed, _ = fit.model.packed(fit.theta)
     estimates = {}
-    for offset, (name, unit) in enumerate(units.items()):
-        index = first + offset
-        if index in found.indices:
-            i = found.indices.index(index)
-            estimates[name] = Estimate(
-                float(found.values[i]), float(found.low[i]), float(found.high[i]), unit
-            )
+    for index, (name, unit) in enumerate(units.items(), first):
+        if index in found:
+            each = found[index]
+            estimates[name] = Estimate(each.value, each.low, each.high, unit)
         else:
             value = float(packed[index])
             estimates[name] = Estimate(value, value, value, unit)

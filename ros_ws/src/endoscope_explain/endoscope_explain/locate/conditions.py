@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from endoscope_explain.audit.examined import runs
 from endoscope_explain.locate.excess import WINDOW_S, SignalExcess
 from endoscope_explain.recording import Array, Mask, RigRecording
 
@@ -83,11 +84,9 @@ def _smoothed(values: Array, width: int) -> Array:
 
 def _lasting(active: Mask, shortest: float) -> Mask:
     """Keep the stretches of at least `shortest` s."""
-    edges = np.flatnonzero(np.diff(np.r_[False, active, False].astype(int)))
     kept = np.zeros(len(active), bool)
-    for a, b in zip(edges[::2], edges[1::2], strict=True):
-        if (b - a) * GRID_S >= shortest:
-            kept[a:b] = True
+    for first, last in runs(active):
+        kept[first : last + 1] = (last + 1 - first) * GRID_S >= shortest
     return kept
 
 

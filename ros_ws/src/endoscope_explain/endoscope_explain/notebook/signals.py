@@ -309,16 +309,10 @@ def _stream(topic: str, time: Array, columns: Mapping[str, Mapping[str, Array]])
     """One topic's messages; columns by quantity, then by name."""
     names = list(dict.fromkeys(name for column in columns.values() for name in column))
     nothing = np.full(len(time), np.nan)
-    values = {
+    values: dict[str, Any] = {
         quantity: np.stack([column.get(name, nothing) for name in names], axis=1)
         for quantity, column in columns.items()
     }
     stamps = np.round(time * 1e9).astype(np.int64)
-    payloads = encode_joint_states(
-        names,
-        stamps,
-        position=values.get('position'),
-        velocity=values.get('velocity'),
-        effort=values.get('effort'),
-    )
+    payloads = encode_joint_states(names, stamps, **values)
     return MessageStream(f'/endoscope/{topic}', JOINT_STATE, payloads, stamps)
