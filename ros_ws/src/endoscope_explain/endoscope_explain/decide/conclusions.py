@@ -294,16 +294,15 @@ def candidates(
     observations: tuple[JointObservation, ...], searches: list[JointSearch]
 ) -> tuple[Tried, ...]:
     """All candidates that were tried, the best first."""
-    found = []
-    for observation, tried in zip(observations, searches, strict=True):
-        for c in tried.tried():
-            found.append(
-                Tried(
-                    observation.joint,
-                    tuple(term.id for term in c.terms),
-                    tried.nominal.evidence - c.evidence,
-                    float(np.mean(c.fit.residuals**2)),
-                    not c.terms and c is not tried.nominal,
-                )
-            )
+    found = [
+        Tried(
+            observation.joint,
+            tuple(term.id for term in c.terms),
+            tried.nominal.evidence - c.evidence,
+            float(np.mean(c.fit.residuals**2)),
+            not c.terms and c is not tried.nominal,
+        )
+        for observation, tried in zip(observations, searches, strict=True)
+        for c in tried.tried()
+    ]
     return tuple(sorted(found, key=lambda c: c.score))

@@ -212,7 +212,7 @@ class _Running:
         log = self.log
         if log.rounds and not log.rounds[-1].recorded and stop in logs.CUT_SHORT:
             log = log.with_last(ended=sentence)
-        self.keep(log.ended(stop, sentence))
+        self.keep(replace(log, stopped=stop, words=sentence))
         self.report(sentence)
         for line in logs.times(self.log):
             self.report(line)

@@ -148,10 +148,6 @@ class Log(_Kept):
         rounds = (replace(r, **changed) if r is last else r for r in self.rounds)  # type: ignore[arg-type]
         return replace(self, rounds=tuple(rounds))
 
-    def ended(self, stop: Stop, words: str) -> 'Log':
-        """The log with why it ends."""
-        return replace(self, stopped=stop, words=words)
-
     def write(self, folder: Path) -> None:
         """Write it as data and in sentences."""
         text = json.dumps(asdict(self), indent=1, allow_nan=False)

@@ -56,13 +56,12 @@ def _at_ends_of_ticks(time: Array, angle: Array, ticks: int) -> Array:
 
 
 def _misfit(observation: JointObservation, outputs: Array, lead: float) -> float:
-    total, count = 0.0, 0
-    for channel in observation.channels:
-        if channel.quantity in BEHIND:
-            wrong = (channel.predicted(outputs, lead) - channel.value) / channel.noise
-            total += float(wrong @ wrong)
-            count += len(wrong)
-    return float(np.sqrt(total / max(count, 1)))
+    wrong = [
+        (channel.predicted(outputs, lead) - channel.value) / channel.noise
+        for channel in observation.channels
+        if channel.quantity in BEHIND
+    ]
+    return float(np.sqrt(np.mean(np.concatenate(wrong) ** 2))) if wrong else 0.0
 
 
 def band_hz(excess: SignalExcess) -> tuple[float, float]:
