@@ -11,7 +11,6 @@ from endoscope_core.physics.functions.places import OTHER_ANGLE
 from endoscope_core.physics.layout import IN_OTHER_JOINT
 from endoscope_core.workers import parallel_map
 from endoscope_explain.decide.conclusions import (
-    NOMINAL_UNITS,
     candidates,
     fitting,
     is_unknown,
@@ -106,7 +105,7 @@ def explain_recording(
         ),
         effects=effects,
         parameters={
-            joint: nominal_estimates(d.chosen.fit, packed_joint(plant, joint)[0], NOMINAL_UNITS)
+            joint: nominal_estimates(d.chosen.fit, packed_joint(plant, joint)[0])
             for joint, d in of_joint.items()
         },
         nominal=plant,

@@ -11,7 +11,6 @@ from scipy.stats import norm
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.effect import Effect, Stage
 from endoscope_core.physics.effects import describe
-from endoscope_core.physics.layout import NOMINAL_KEYS
 from endoscope_explain.decide.decision import Decision, MissingTerm
 from endoscope_explain.explanation import (
     ChannelFit,
@@ -25,7 +24,6 @@ from endoscope_explain.explanation import (
 from endoscope_explain.fit.evidence import held_out_fit
 from endoscope_explain.fit.free_parameters import (
     FITTED_NOMINAL,
-    FRICTION_PROFILE_NAMES,
     nominal_number,
 )
 from endoscope_explain.fit.intervals import effect_estimates, nominal_estimates
@@ -46,9 +44,6 @@ many that did not change, each with its own, one would mostly seem to differ."""
 MOST = 0.5
 """Share of the misfit that names must explain where they leave more than another form would: with
 less, the main thing has no name."""
-NOMINAL_UNITS = {
-    name: nominal_number(name).unit or '-' for name in (*NOMINAL_KEYS, *FRICTION_PROFILE_NAMES)
-}
 
 
 def named(
@@ -75,7 +70,6 @@ def named(
 
 
 def _named(joint: str, decision: Decision, term: MissingTerm) -> NamedEffect:
-    definition = describe(term.name)
     # Of physics that was given, no other name was tried.
     measured = math.isfinite(term.p_value)
     modelled = term.name in decision.chosen.effects
@@ -84,13 +78,7 @@ def _named(joint: str, decision: Decision, term: MissingTerm) -> NamedEffect:
     return NamedEffect(
         term.name,
         joint,
-        {}
-        if fitted is None
-        else effect_estimates(
-            fitted.fit,
-            definition.first_parameter,
-            {p.name: p.unit for p in definition.parameters},
-        ),
+        {} if fitted is None else effect_estimates(fitted.fit, describe(term.name)),
         tried.alternatives(term.name),
         {
             'gain': term.gain,
@@ -145,9 +133,7 @@ def numbers_differ(decisions: list[Decision]) -> bool:
     return any(
         has_changed(name, e)
         for d in decisions
-        for name, e in nominal_estimates(
-            d.chosen.fit, d.chosen.fit.model.base, NOMINAL_UNITS
-        ).items()
+        for name, e in nominal_estimates(d.chosen.fit, d.chosen.fit.model.base).items()
     )
 
 
@@ -194,8 +180,7 @@ def plant_of(plant: PlantDescription, fits: list[Candidate]) -> PlantDescription
 
 def _width(found: Fit, effect: Effect) -> float:
     """Width of the interval of an effect's first number."""
-    first = effect.parameters[0]
-    estimate = effect_estimates(found, effect.first_parameter, {first.name: first.unit})[first.name]
+    estimate = effect_estimates(found, effect)[effect.parameters[0].name]
     return estimate.high - estimate.low
 
 

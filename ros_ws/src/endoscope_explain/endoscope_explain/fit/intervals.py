@@ -14,7 +14,7 @@ from endoscope_core.physics.description import NUMBERS
 from endoscope_core.physics.effect import Effect
 from endoscope_core.physics.effects import lacking
 from endoscope_core.physics.functions.places import NODES, VALUES
-from endoscope_core.physics.layout import FRICTION_PROFILE, PROFILE_TERMS
+from endoscope_core.physics.layout import FRICTION_PROFILE, NOMINAL_KEYS, PROFILE_TERMS
 from endoscope_core.workers import parallel_map
 from endoscope_explain.criteria import INTERVAL_WIDTH
 from endoscope_explain.explanation import NINETY_PERCENT, Estimate, NominalEstimate
@@ -23,6 +23,7 @@ from endoscope_explain.fit.free_parameters import (
     COEFFICIENT,
     FITTED_NOMINAL,
     FRICTION_PROFILE_NAMES,
+    nominal_number,
     tolerance,
 )
 from endoscope_explain.fit.model import Fit, broyden_fit
@@ -191,9 +192,12 @@ def may_be_absent(fit: Fit, effect: Effect) -> bool:
     return squared <= chi2.ppf(0.9, len(strengths))
 
 
-def nominal_estimates(
-    fit: Fit, described: Array, units: dict[str, str]
-) -> dict[str, NominalEstimate]:
+NOMINAL_UNITS = {
+    name: nominal_number(name).unit or '-' for name in (*NOMINAL_KEYS, *FRICTION_PROFILE_NAMES)
+}
+
+
+def nominal_estimates(fit: Fit, described: Array) -> dict[str, NominalEstimate]:
     """Estimates of the nominal parameters of a fit, beside those described (parameters,)."""
     ends, estimates = fit.at_bounds(), {}
     absent = {place for each in lacking(described) for place in each.places}
@@ -205,7 +209,7 @@ def nominal_estimates(
                 each.value,
                 each.low,
                 each.high,
-                units.get(each.name, ''),
+                NOMINAL_UNITS[each.name],
                 nominal,
                 low <= each.value <= high,
                 each.shown,
@@ -215,16 +219,14 @@ def nominal_estimates(
     return estimates
 
 
-def effect_estimates(fit: Fit, first: int, units: dict[str, str]) -> dict[str, Estimate]:
-    """Estimates of one effect's parameters: those named in `units`, from packed index `first`."""
+def effect_estimates(fit: Fit, effect: Effect) -> dict[str, Estimate]:
+    """Estimates of one effect's parameters, by their names."""
     found = {each.index: each for each in intervals(fit)}
     packed, _ = fit.model.packed(fit.theta)
     estimates = {}
-    for index, (name, unit) in enumerate(units.items(), first):
-        if index in found:
-            each = found[index]
-            estimates[name] = Estimate(each.value, each.low, each.high, unit)
-        else:
-            value = float(packed[index])
-            estimates[name] = Estimate(value, value, value, unit)
+    for index, parameter in zip(effect.places, effect.parameters, strict=True):
+        value = low = high = float(packed[index])
+        if (each := found.get(index)) is not None:
+            value, low, high = each.value, each.low, each.high
+        estimates[parameter.name] = Estimate(value, low, high, parameter.unit)
     return estimates

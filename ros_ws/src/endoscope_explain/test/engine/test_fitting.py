@@ -187,7 +187,7 @@ def told_of(one_joint, desired, *, cells=True):
     (observation,) = observe(recording, plant)
     packed = packed_joint(plant, 'bend_x')
     fitted, _ = nominal_references(observation, *packed)
-    return nominal_estimates(fitted, packed[0], {})
+    return nominal_estimates(fitted, packed[0])
 
 
 def test_a_number_that_moves_no_channel_is_not_shown(one_joint):
