@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -65,8 +66,13 @@ def recordings_joined(recordings: Sequence[RigRecording]) -> RigRecording:
     first = recordings[0]
     later = _later_by(recordings)
     measured = [recording.measured() for recording in recordings]
-    everywhere = [name for name in measured[0] if all(name in own for own in measured)]
-    whole = replace(
+    series: dict[str, Any] = {
+        name: _one_after_another([own[name] for own in measured], later)
+        if all(name in own for own in measured)
+        else None
+        for name in measured[0]
+    }
+    return replace(
         first,
         name=', '.join(recording.name for recording in recordings),
         command=_one_after_another([recording.command for recording in recordings], later),
@@ -79,13 +85,7 @@ def recordings_joined(recordings: Sequence[RigRecording]) -> RigRecording:
             )
             for one, by in zip(recordings[1:], later[1:], strict=True)
         ),
-        tension=None,
-        shaft_position=None,
-        shaft_velocity=None,
-        shaft_effort=None,
-    )
-    return whole.with_series(
-        {name: _one_after_another([own[name] for own in measured], later) for name in everywhere}
+        **series,
     )
 
 
