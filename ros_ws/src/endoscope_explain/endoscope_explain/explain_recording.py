@@ -22,8 +22,7 @@ from endoscope_explain.decide.conclusions import (
     refitted,
     verdict,
 )
-from endoscope_explain.decide.decision import Decision, decide
-from endoscope_explain.decide.given_physics import GivenJoints, explained_by
+from endoscope_explain.decide.decision import Decision, GivenJoints, decide, explained_by
 from endoscope_explain.explanation import Explanation, Verdict
 from endoscope_explain.fit.intervals import nominal_estimates
 from endoscope_explain.fit.model import Fit, packed_joint

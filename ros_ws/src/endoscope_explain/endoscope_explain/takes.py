@@ -16,11 +16,11 @@ from threadpoolctl import threadpool_limits
 
 from endoscope_explain.audit.finding import AuditReport
 from endoscope_explain.case import Inputs, Sources
-from endoscope_explain.decide.decision import found_together
-from endoscope_explain.decide.given_physics import (
+from endoscope_explain.decide.decision import (
     GivenJoints,
     GivenPhysics,
     Rivalry,
+    found_together,
     without_recording,
 )
 from endoscope_explain.fit.nominal import ReferenceFits, with_references

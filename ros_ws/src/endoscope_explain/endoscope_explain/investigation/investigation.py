@@ -20,12 +20,14 @@ from endoscope_explain.explanation import NamedEffect, Verdict
 from endoscope_explain.investigation import log as logs
 from endoscope_explain.investigation.log import Log, Name, RigAnswer, Round, Stop
 from endoscope_explain.investigation.motions import (
+    PlayThrough,
     RigMotion,
     commissioning,
+    held_out,
     of_experiment,
     require_allowed,
+    with_tracking,
 )
-from endoscope_explain.investigation.tracking import PlayThrough, held_out, with_tracking
 from endoscope_explain.open_questions import open_questions
 from endoscope_explain.operator_changes import what_would_decide
 from endoscope_explain.pipeline import Progress, explain_case, read_inputs

@@ -13,8 +13,16 @@ from endoscope_explain.case import ChainCut, Mismatch, changed_parameters
 from endoscope_explain.explanation import Explanation, NamedEffect
 from endoscope_explain.fit.free_parameters import nominal_number
 from endoscope_explain.fit.model import simulate_joint
-from endoscope_explain.locate.conditions import conditions, drive, regime_in_words
-from endoscope_explain.locate.excess import SignalExcess, excess_between, intervals, onset, shares
+from endoscope_explain.locate.excess import (
+    SignalExcess,
+    conditions,
+    drive,
+    excess_between,
+    intervals,
+    onset,
+    regime_in_words,
+    shares,
+)
 from endoscope_explain.observe.observation import JointObservation, observe
 from endoscope_explain.observe.predicted_signals import packed_rig, reading_lead, simulate_rig
 from endoscope_explain.open_questions import without

@@ -5,7 +5,7 @@ import pytest
 
 from endoscope_core.physics.description import EffectSpec
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_explain.decide.given_physics import without_recording
+from endoscope_explain.decide.decision import without_recording
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.fit.model import fit
 from endoscope_explain.fit.nominal import with_references
