@@ -23,12 +23,7 @@ from endoscope_core.errors import InputError
 from endoscope_core.kinematics import tip_pose
 from endoscope_core.names import JOINTS
 from endoscope_core.physics import PlantDescription, SensorModel
-from endoscope_core.physics.on_stamps import (
-    NANOSECONDS,
-    AnswerStamps,
-    RigReadings,
-    answer_commands,
-)
+from endoscope_core.physics.on_stamps import NANOSECONDS, AnswerStamps, RigReadings, answer_commands
 from endoscope_core.physics.packing import recording_faults
 from endoscope_core.physics.plant_file import plant_as_text
 from endoscope_core.physics.sensing import TOPICS

@@ -12,12 +12,7 @@ from endoscope_core.physics.effect import Effect
 from endoscope_core.physics.effects import describe
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.places import Place
-from endoscope_explain.prediction_set import (
-    OTHER_NUMBERS,
-    Array,
-    Contest,
-    Posterior,
-)
+from endoscope_explain.prediction_set import OTHER_NUMBERS, Array, Contest, Posterior
 
 NINETY_PERCENT = 1.645
 """Standard deviations that hold 90 % of a normal distribution, either way."""

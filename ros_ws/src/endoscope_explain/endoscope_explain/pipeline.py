@@ -31,11 +31,7 @@ from endoscope_explain.locate.locating import (
     locate_parameters,
     locate_unknown,
 )
-from endoscope_explain.recording import (
-    RigRecording,
-    recording_from_bag,
-    with_unrecorded,
-)
+from endoscope_explain.recording import RigRecording, recording_from_bag, with_unrecorded
 
 Engine = Callable[..., Explanation]
 

@@ -22,10 +22,7 @@ from endoscope_explain.explanation import (
     Verdict,
 )
 from endoscope_explain.fit.evidence import held_out_fit
-from endoscope_explain.fit.free_parameters import (
-    FITTED_NOMINAL,
-    nominal_number,
-)
+from endoscope_explain.fit.free_parameters import FITTED_NOMINAL, nominal_number
 from endoscope_explain.fit.intervals import effect_estimates, nominal_estimates
 from endoscope_explain.fit.model import Fit, joint_of
 from endoscope_explain.fit.solver import Ended

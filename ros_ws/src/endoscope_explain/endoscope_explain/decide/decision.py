@@ -15,13 +15,7 @@ from endoscope_explain.fit.evidence import log_evidence
 from endoscope_explain.fit.family import Family
 from endoscope_explain.fit.free_parameters import FreeParameter
 from endoscope_explain.fit.intervals import may_be_absent, with_form
-from endoscope_explain.fit.model import (
-    TO_THE_END,
-    Fit,
-    JointModel,
-    fit,
-    without_effect,
-)
+from endoscope_explain.fit.model import TO_THE_END, Fit, JointModel, fit, without_effect
 from endoscope_explain.prediction_set import OTHER_NUMBERS, Contest
 from endoscope_explain.recording import Array, Mask
 from endoscope_explain.search.levels import JointSearch, Level, search

@@ -16,15 +16,7 @@ from endoscope_core.physics.packing import pack
 from endoscope_core.physics.simulator import TICK
 from endoscope_explain.fit.family import Family
 from endoscope_explain.fit.free_parameters import COEFFICIENT, COORDINATE, LEAD, FreeParameter
-from endoscope_explain.fit.solver import (
-    STEP,
-    Effort,
-    Ended,
-    Minimum,
-    Renewal,
-    Secants,
-    minimise,
-)
+from endoscope_explain.fit.solver import STEP, Effort, Ended, Minimum, Renewal, Secants, minimise
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.observe.predicted_signals import simulate_joints
 from endoscope_explain.recording import Array, Mask

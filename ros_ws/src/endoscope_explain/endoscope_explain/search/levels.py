@@ -34,18 +34,9 @@ from endoscope_explain.search.judging import (
     Judge,
 )
 from endoscope_explain.search.left_out import LEAST_RECORDINGS
-from endoscope_explain.search.null_rigs import (
-    NO_DETECTABLE_GAIN,
-    null_of_several,
-    null_rigs,
-)
+from endoscope_explain.search.null_rigs import NO_DETECTABLE_GAIN, null_of_several, null_rigs
 from endoscope_explain.search.pairs import better_pair
-from endoscope_explain.search.refit import (
-    Candidate,
-    by_fine_derivatives,
-    candidate,
-    converged,
-)
+from endoscope_explain.search.refit import Candidate, by_fine_derivatives, candidate, converged
 from endoscope_explain.search.term import Term
 
 MOST_FITS, WORTH_A_FIT = 6, 1.0
