@@ -1,6 +1,7 @@
 """What the demonstration's recordings show, beside the first paper's figures in one table."""
 
 import textwrap
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -196,10 +197,9 @@ def analyse(
     """Figures of all runs, from the recordings alone; `lost` is what recorders missed, by topic."""
     recordings = {tube: open_bag(path) for tube, path in bags.items()}
     angles = {tube: Angles.of(recording) for tube, recording in recordings.items()}
-    messages: dict[str, int] = {}
+    messages: Counter[str] = Counter()
     for recording in recordings.values():
-        for name, topic in recording.topics.items():
-            messages[name] = messages.get(name, 0) + topic.message_count
+        messages.update({name: topic.message_count for name, topic in recording.topics.items()})
     return DemoResults(
         tuple(
             _calibration(recordings[facts.tube], angles[facts.tube], facts)

@@ -126,11 +126,10 @@ def _unknown(joint: str, quantities: Iterable[str], why: str) -> list[ChannelDel
 def _shafts(recording: RigRecording) -> list[ChannelDelay | None]:
     """Delay of each joint's shaft; None where it was not recorded."""
     shaft, command = recording.shaft_position, recording.command
+    if shaft is None:
+        return [None for _ in recording.joints]
     found: list[ChannelDelay | None] = []
     for j, joint in enumerate(recording.joints):
-        if shaft is None:
-            found.append(None)
-            continue
         valid = shaft.valid[:, j]
         shift = shift_after(
             command.time, command.values[:, j], shaft.time[valid], shaft.values[valid, j]

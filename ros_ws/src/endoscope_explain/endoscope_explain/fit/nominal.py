@@ -119,16 +119,15 @@ def against_baseline(observation: JointObservation, healthy: Fit) -> JointObserv
     """A joint's observation, corrected by what the plant never explained of it in health."""
     before = healthy.model.observation
     repeated = _same_commands(observation, before)
-    parts = dict(zip((c.signal for c in before.channels), before.slices(), strict=True))
-    known = {c.signal: c for c in before.channels}
-    channels = []
-    for channel in observation.channels:
-        if channel.signal not in known:
-            channels.append(channel)
-            continue
-        residual = healthy.residuals[parts[channel.signal]]
-        channels.append(_corrected(channel, known[channel.signal], residual, repeated))
-    return replace(observation, channels=tuple(channels))
+    known = {
+        channel.signal: (channel, healthy.residuals[part])
+        for channel, part in zip(before.channels, before.slices(), strict=True)
+    }
+    channels = tuple(
+        _corrected(c, *known[c.signal], repeated) if c.signal in known else c
+        for c in observation.channels
+    )
+    return replace(observation, channels=channels)
 
 
 def _same_commands(one: JointObservation, other: JointObservation) -> bool:

@@ -111,16 +111,15 @@ def trial_fit(references: tuple[Fit, ...], term: Term, offset: Array) -> TrialFi
     model = term.added_to(references[0].model)
     coarse = model.on_coarse_ticks(offset)
     weight = weights(model.observation, references[0].residuals)
-    best: TrialFit | None = None
-    for reference in references:
+
+    def begun_from(reference: Fit) -> TrialFit:
         theta = model.begun_at(reference.theta)
         new = list(range(len(reference.theta), len(theta)))
         derivative = np.hstack([reference.jacobian, jacobian(coarse, theta, new)])
         found = broyden_fit(coarse, theta, derivative, TRIAL_STEPS, weight)
-        if best is None or found.cost < best.cost:
-            best = TrialFit(term, model, coarse, found.theta, found.cost)
-    assert best is not None
-    return best
+        return TrialFit(term, model, coarse, found.theta, found.cost)
+
+    return min(map(begun_from, references), key=lambda each: each.cost)
 
 
 def cost_before(found: Fit) -> float:
@@ -132,16 +131,15 @@ def cost_before(found: Fit) -> float:
 def begun_beside(function: Fit, without: Fit, starts: Sequence[Term], offset: Array) -> TrialFit:
     """The start of a formula that leaves least beside the numbers of a fit with its function."""
     weight = weights(function.model.observation, without.residuals)
-    best: TrialFit | None = None
-    for term in starts:
+
+    def begun(term: Term) -> TrialFit:
         model = term.added_to(without.model)
         coarse = model.on_coarse_ticks(offset)
         theta = model.begun_at(function.theta[: len(without.theta)])
         cost = coarse.cost(weight * coarse.residuals(theta), theta)
-        if best is None or cost < best.cost:
-            best = TrialFit(term, model, coarse, theta, cost)
-    assert best is not None
-    return best
+        return TrialFit(term, model, coarse, theta, cost)
+
+    return min(map(begun, starts), key=lambda each: each.cost)
 
 
 def term_of(seen: Sequence[TrialFit | None]) -> Term:
