@@ -245,11 +245,10 @@ class _Past:
 
 @dataclass(frozen=True)
 class _Start:
-    """A motor when its recording begins: angle in rad and speed in rad/s (2,), and ways back (K,).
+    """A motor when its recording begins: angle in rad and speed in rad/s (2,), ways back (K,)."""
 
-    A way back leads from a reversal, on the way that the motor came, to where it is. Until
-    `turns_until` s the motor is not as its servo would bring it from there.
-    """
+    # A way back leads from a reversal, on the way that the motor came, to where it is. Until
+    # `turns_until` s the motor is not as its servo would bring it from there.
 
     motor: Array
     backs: Array = field(default_factory=lambda: np.empty(0))
