@@ -22,7 +22,6 @@ from endoscope_explain.recording import RigRecording
 
 __all__ = ['AuditReport', 'Finding', 'Severity', 'audit_recording']
 
-
 STEPS = (
     stamp_order,
     stamp_unit,
