@@ -47,8 +47,8 @@ def interrupted(folder, plant):
     motion = Round(
         COMMISSIONING, 'bend_x and bend_y', '', 'motion_1.csv', 4.0, 50.0, 'bag_1', recorded=True
     )
-    log = replace(log, rounds=(motion,))
-    log.ended(Stop.INTERRUPTED, 'It was interrupted.').write(folder)
+    words = 'It was interrupted.'
+    replace(log, rounds=(motion,), stopped=Stop.INTERRUPTED, words=words).write(folder)
 
 
 def explained_earlier(bags):

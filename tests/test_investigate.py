@@ -17,9 +17,8 @@ from endoscope_core.physics import EffectSpec, PlantDescription, save_plant
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import hold, move, sequence
 from endoscope_core.signals.command_file import CommandTable, write_command_file
-from endoscope_explain.investigation import tracking
-from endoscope_explain.investigation.motions import RigMotion
-from endoscope_explain.investigation.tracking import held_out, tracked
+from endoscope_explain.investigation import motions
+from endoscope_explain.investigation.motions import RigMotion, held_out, tracked
 from endoscope_nodes.client.graph_parameters import read_parameter
 from endoscope_nodes.client.motion_player import MotionPlayer
 from endoscope_nodes.names import SLAVE_COMMAND
@@ -34,7 +33,7 @@ LARGEST = 0.5
 @pytest.fixture(autouse=True)
 def short(monkeypatch):
     """Less of a motion shows, too, by which plant the tip follows better."""
-    monkeypatch.setattr(tracking, 'DURATION_S', 4.0)
+    monkeypatch.setattr(motions, 'DURATION_S', 4.0)
 
 
 @pytest.fixture

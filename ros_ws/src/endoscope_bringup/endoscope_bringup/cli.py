@@ -16,7 +16,6 @@ from endoscope_bringup.subcommands import (
     OneLineParser,
     add_subcommands,
     commands_of_other_packages,
-    run_chosen,
 )
 from endoscope_core.choices import LOG_LEVEL_VARIABLE, LOG_LEVELS
 from endoscope_core.exit_status import exit_status
@@ -64,7 +63,7 @@ def build_parser() -> OneLineParser:
         help='lowest level that nodes and libraries of this command log (info)',
     )
     own = [f'endoscope_bringup.commands.{name}' for name in COMMANDS]
-    add_subcommands(parser, [*own, *commands_of_other_packages().values()], dest='command')
+    add_subcommands(parser, [*own, *commands_of_other_packages().values()])
     return parser
 
 
@@ -79,7 +78,7 @@ def _run(argv: Sequence[str]) -> int:
     if args.log_level is not None:
         _log_from(args.log_level)
     with _cleanup_on_sigterm():
-        return run_chosen(args, dest='command')
+        return int(args.run_command(args))
 
 
 def _log_from(level: str) -> None:

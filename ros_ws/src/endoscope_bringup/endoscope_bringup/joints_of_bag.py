@@ -23,11 +23,9 @@ Array = NDArray[np.float64]
 
 
 def hysteresis_of_bag(bag: Recording, gear: float) -> dict[str, HysteresisRecording]:
-    """Motor angle and bending at the joint, at 200 Hz; `gear` is shaft rad for one rad of bending.
-
-    The motor angle is the measured one; where it is missing, the motor's command or the desired
-    angle passed through the nominal servo.
-    """
+    """Motor angle and bending of each joint, at 200 Hz; `gear` is shaft rad for one of bending."""
+    # Where no motor was measured its command or the desired angle is taken, through the nominal
+    # servo.
     bending = bag.joint_state(SLAVE_MEASURED, finite=('position',))
     motor, scale, measured = _motor(bag, gear)
     origin = int(bending.stamp_ns[0])
@@ -95,10 +93,8 @@ class PlantRecording:
 
 
 def plant_recordings_of_bag(bag: Recording, gear: float) -> dict[str, PlantRecording]:
-    """Every joint with motor command and two tensions; `gear` is shaft rad for one of bending.
-
-    The recording should begin at rest at zero, as a calibration does.
-    """
+    """Every joint with motor command and two tensions; `gear` is shaft rad for one of bending."""
+    # The recording should begin at rest at zero, as a calibration does.
     for topic in (MOTOR_COMMAND, WIRES_MEASURED):
         if not bag.has(topic):
             raise EndoscopeError(f'{bag.path}: lacks {topic}, which shows the plant')

@@ -11,12 +11,11 @@ REDRAWN_S = 1.0
 
 
 class ProgressLine:
-    """A bar of one line with the current step and the elapsed time.
+    """A bar of one line with the current step and the elapsed time, or a line for each step."""
 
-    `steps` is their approximate number, if :meth:`show` does not give the share: a bar is full only
-    when all is done. Where `stream` (default: stderr) is no terminal, each step is a line, but
-    not the `first`, which begins at once: bad input is refused in it, with one line alone.
-    """
+    # `steps` is their approximate number, if :meth:`show` does not give the share: a bar is full
+    # only when all is done. Where `stream` (default: stderr) is no terminal, each step is a line,
+    # but not the `first`, which begins at once: bad input is refused in it, with one line alone.
 
     def __init__(self, steps: int = 1, first: str = '', stream: TextIO | None = None) -> None:
         self._stream = sys.stderr if stream is None else stream

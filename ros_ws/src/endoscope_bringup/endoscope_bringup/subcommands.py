@@ -68,20 +68,15 @@ class OneLineParser(argparse.ArgumentParser):
         self.exit(2, f'{self.prog}: {one_line} (see {self.prog} --help)\n')
 
 
-def add_subcommands(parser: argparse.ArgumentParser, modules: Iterable[str], *, dest: str) -> None:
-    """Add one subparser for each module, in this order; `dest` of the arguments is the choice."""
-    subparsers = parser.add_subparsers(dest=dest, metavar=dest.upper(), required=True)
+def add_subcommands(parser: argparse.ArgumentParser, modules: Iterable[str]) -> None:
+    """Add one subparser for each module, in this order; `run_command` of the arguments runs it."""
+    subparsers = parser.add_subparsers(dest='command', metavar='COMMAND', required=True)
     for name in modules:
         module = importlib.import_module(name)
         known = set(subparsers.choices)
         module.add_parser(subparsers)
         for added in set(subparsers.choices) - known:
-            subparsers.choices[added].set_defaults(**{f'run_{dest}': module.run})
-
-
-def run_chosen(args: argparse.Namespace, *, dest: str) -> int:
-    """Run the module that `add_subcommands` with the same `dest` chose; return its exit status."""
-    return int(getattr(args, f'run_{dest}')(args))
+            subparsers.choices[added].set_defaults(run_command=module.run)
 
 
 def within[T: (int, float)](low: T, high: T, kind: type[T]) -> Callable[[str], T]:

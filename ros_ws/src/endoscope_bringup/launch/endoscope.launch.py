@@ -50,46 +50,41 @@ def generate_launch_description() -> LaunchDescription:
             **others,
         )
 
+    def argument(name: str, default: object, words: str, **how: object) -> DeclareLaunchArgument:
+        return DeclareLaunchArgument(name, default_value=default, description=words, **how)
+
     return LaunchDescription(
         [
-            DeclareLaunchArgument(
+            argument(
                 'config',
-                default_value=PathJoinSubstitution(
+                PathJoinSubstitution(
                     [FindPackageShare('endoscope_bringup'), 'config', 'endoscope.yaml']
                 ),
-                description='parameters of the nodes',
+                'parameters of the nodes',
             ),
-            DeclareLaunchArgument(
-                'namespace', default_value='endoscope', description='of all nodes and topics'
+            argument('namespace', 'endoscope', 'of all nodes and topics'),
+            argument('rig_file', '', 'rig.yaml with devices and limits; empty for the shipped one'),
+            argument(
+                'plant_file', '', 'plant.yaml of the simulated slave; empty for that of the rig'
             ),
-            DeclareLaunchArgument(
-                'rig_file',
-                default_value='',
-                description='rig.yaml with devices and limits; empty for the shipped one',
-            ),
-            DeclareLaunchArgument(
-                'plant_file',
-                default_value='',
-                description='plant.yaml of the simulated slave; empty for that of the rig',
-            ),
-            DeclareLaunchArgument(
+            argument(
                 'processes',
-                default_value='one',
+                'one',
+                'all nodes in one process, or each in its own',
                 choices=['one', 'many'],
-                description='all nodes in one process, or each in its own',
             ),
-            DeclareLaunchArgument(
+            argument(
                 'real_time',
-                default_value='false',
+                'false',
+                'true for the wall clock: a rig with a real device needs it where each node has a '
+                'process, and one process takes it there by itself',
                 choices=['true', 'false'],
-                description='true for the wall clock: a rig with a real device needs it where each '
-                'node has a process, and one process takes it there by itself',
             ),
-            DeclareLaunchArgument(
+            argument(
                 'watch',
-                default_value='false',
+                'false',
+                'whether the rig is compared with its plant while it moves',
                 choices=['true', 'false'],
-                description='whether the rig is compared with its plant while it moves',
             ),
             # In one process the graph decides for itself unless this is given.
             SetParameter('use_sim_time', False, condition=IfCondition(real_time)),

@@ -8,16 +8,22 @@ import numpy as np
 import pytest
 from chromium import LARGEST_PAGE, drawn
 
-from endoscope_bringup.demo import sentences
-from endoscope_bringup.demo.analysis import Angles, run_of, start_of_motion
 from endoscope_bringup.demo.procedure import MOTIONS, TUBES, CalibrationFacts, Method, RecordedRun
-from endoscope_bringup.demo.report_page import endoscope_picture, report_page
+from endoscope_bringup.demo.report_page import (
+    endoscope_picture,
+    headline,
+    report_page,
+    where_signals_were_cut,
+)
 from endoscope_bringup.demo.results import (
+    Angles,
     CalibrationOutcome,
     DemoResults,
     TrackingRun,
     figures_table,
     ranking,
+    run_of,
+    start_of_motion,
     table_rows,
 )
 from endoscope_core.signals import motion_by_name
@@ -114,14 +120,14 @@ def test_the_page_says_whose_equations_the_inverse_uses(page):
 def test_no_method_is_praised_where_none_helps():
     lag = {Method.NONE: 0.1, Method.BOUC_WEN: 0.2, Method.INVERSE: 0.3}
     worse = results_of(lag)
-    assert 'no compensation makes the error smaller' in sentences.headline(table_rows(worse))
+    assert 'no compensation makes the error smaller' in headline(table_rows(worse))
     assert 'is best' not in report_page(worse, {})
 
 
 def test_a_signal_that_a_tube_cannot_follow_is_said_to_be_cut(results):
-    assert sentences.where_signals_were_cut(results, Method.INVERSE) == []
+    assert where_signals_were_cut(results, Method.INVERSE) == []
     runs = tuple(replace(r, desired_deg=np.minimum(r.desired_deg, 51.5)) for r in results.runs)
-    said = sentences.where_signals_were_cut(replace(results, runs=runs), Method.INVERSE)
+    said = where_signals_were_cut(replace(results, runs=runs), Method.INVERSE)
     assert len(said) == len(TUBES)
     assert 'can be bent from -62° to 52° only' in said[0]
     assert '60 sin t by up to 8.5°' in said[0]

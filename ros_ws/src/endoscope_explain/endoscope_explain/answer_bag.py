@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import reduce
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +23,7 @@ from endoscope_core.errors import InputError
 from endoscope_core.kinematics import tip_pose
 from endoscope_core.names import JOINTS
 from endoscope_core.physics import PlantDescription, SensorModel
-from endoscope_core.physics.on_stamps import (
-    NANOSECONDS,
-    AnswerStamps,
-    RigReadings,
-    answer_commands,
-)
+from endoscope_core.physics.on_stamps import NANOSECONDS, AnswerStamps, RigReadings, answer_commands
 from endoscope_core.physics.packing import recording_faults
 from endoscope_core.physics.plant_file import plant_as_text
 from endoscope_core.physics.sensing import TOPICS
@@ -40,6 +36,7 @@ from endoscope_explain.recording import (
     INPUT_TOPICS,
     MOTOR,
     WIRES,
+    Array,
     input_topic,
     motor_name,
     require_running_stamps,
@@ -54,13 +51,12 @@ READ_DELAYS = (0.0, TICK)
 """Seconds from a stamp to its reading that a rig at 1 kHz may have."""
 
 Stamps = NDArray[np.int64]
-Floats = NDArray[np.float64]
 
 
 def answer_poses(
     recorded: PoseSeries,
-    stamp_ns: NDArray[np.int64],
-    bending: Floats,
+    stamp_ns: Stamps,
+    bending: Array,
     joints: Sequence[str],
 ) -> MessageStream:
     """Poses that a tracker which reads these angles (N, J) in rad at these stamps would report."""
@@ -108,8 +104,8 @@ class BagCommands:
 
     topic: str  # full name of the topic they come from
     joints: tuple[str, ...]  # joints of the plant that are commanded, in the plant's order
-    stamp_ns: NDArray[np.int64]  # (N,), not decreasing
-    shaft: NDArray[np.float64]  # (N, J), motor shaft angle in rad
+    stamp_ns: Stamps  # (N,), not decreasing
+    shaft: Array  # (N, J), motor shaft angle in rad
 
     @property
     def namespace(self) -> str:
@@ -118,10 +114,7 @@ class BagCommands:
 
 
 def commands_of_bag(recording: Recording, plant: PlantDescription, rig: Rig) -> BagCommands:
-    """Shaft commands of a bag, or desired angles times the gear.
-
-    InputError without either, and where one turns a shaft further than the rig lets it.
-    """
+    """Shaft commands of a bag, or desired angles times the gear; InputError if none can be used."""
     topic = input_topic(recording)
     if not topic:
         raise InputError(recording.lacking(COMMAND, DESIRED))
@@ -174,17 +167,11 @@ def write_answer(
     noise_seed: int | None = None,
     rig: Rig | None = None,
 ) -> int:
-    """Write the answer of a plant to the commands of a recording; return the number of messages.
-
-    The new bag has the commands as they are, `motor/measured_js`, `wires/measured_js` and
-    `slave/measured_js` at the stamps, under the namespace and with the times of receipt of the
-    recording, and states on `rig/kind` that it was simulated; a topic that the recording lacks
-    comes at its nominal rate. Only joints that are commanded answer. Where the recording has
-    `tracker/measured_cp`, the answer has it too, at the stamps that it shares with
-    `slave/measured_js`. Without a seed there is neither noise nor quantisation. InputError,
-    BagError or FileError if the recording has no usable commands, its rig cannot be read, or `out`
-    exists.
-    """
+    """Write a bag with the answer of a plant to the commands of a recording; how many messages."""
+    # It has the commands as they are and what is measured at the stamps, under the namespace and
+    # with the times of receipt of the recording; a topic that the recording lacks comes at its
+    # nominal rate. Only joints that are commanded answer. Poses are at the stamps that they share
+    # with `slave/measured_js`. Without a seed there is neither noise nor quantisation.
     rig = rig or rig_of_bag(recording)
     commands = commands_of_bag(recording, plant, rig)
     driven = plant.of_joints(commands.joints)
@@ -202,7 +189,9 @@ def write_answer(
         stamps = AnswerStamps(*(times[suffix].stamp_ns for suffix in rates))
         answer = _answer_as_stamped(driven, commands, stamps, _recorded_shaft(recording, commands))
         if noise_seed is not None:
-            answer = _noisy(answer, SensorModel(plant.sensors, noise_seed))
+            sensors = SensorModel(plant.sensors, noise_seed)
+            read = {name: getattr(sensors, name)(clean) for name, clean in vars(answer).items()}
+            answer = RigReadings(**read)
         streams = [_copied(recording, suffix) for suffix in INPUT_TOPICS if recording.has(suffix)]
         streams += _encoded(answer, times, commands.joints)
         if recording.has(POSE_TOPIC):
@@ -277,16 +266,6 @@ def _kind(plant: PlantDescription, rig: Rig, commands: BagCommands) -> MessageSt
     return MessageStream(commands.namespace + RIG_KIND, STRING, content, commands.stamp_ns[:1])
 
 
-def _noisy(answer: RigReadings, sensors: SensorModel) -> RigReadings:
-    return RigReadings(
-        sensors.shaft_position(answer.shaft_position),
-        sensors.shaft_velocity(answer.shaft_velocity),
-        sensors.shaft_effort(answer.shaft_effort),
-        sensors.tension(answer.tension),
-        sensors.bending(answer.bending),
-    )
-
-
 def _copied(recording: Recording, suffix: str) -> MessageStream:
     topic = recording.find(suffix)
     messages = list(recording.messages([topic]))
@@ -302,24 +281,22 @@ def _copied(recording: Recording, suffix: str) -> MessageStream:
 def _encoded(
     answer: RigReadings, times: dict[str, _Times], joints: tuple[str, ...]
 ) -> list[MessageStream]:
-    def stream(
-        suffix: str,
-        names: Sequence[str],
-        position: Floats | None = None,
-        velocity: Floats | None = None,
-        effort: Floats | None = None,
-    ) -> MessageStream:
+    def stream(suffix: str, names: Sequence[str], **readings: Any) -> MessageStream:
         at = times[suffix]
-        payloads = encode_joint_states(
-            names, at.stamp_ns, position=position, velocity=velocity, effort=effort
-        )
+        payloads = encode_joint_states(names, at.stamp_ns, **readings)
         return MessageStream(at.topic, JOINT_STATE, payloads, at.log_ns, at.publish_ns)
 
     motors = [motor_name(joint) for joint in joints]
     wires = [wire for joint in joints for wire in wire_names(joint)]
     tension = answer.tension.reshape(len(answer.tension), -1)
     return [
-        stream(MOTOR, motors, answer.shaft_position, answer.shaft_velocity, answer.shaft_effort),
+        stream(
+            MOTOR,
+            motors,
+            position=answer.shaft_position,
+            velocity=answer.shaft_velocity,
+            effort=answer.shaft_effort,
+        ),
         stream(WIRES, wires, effort=tension),
-        stream(BENDING, joints, answer.bending),
+        stream(BENDING, joints, position=answer.bending),
     ]

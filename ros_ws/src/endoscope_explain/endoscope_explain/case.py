@@ -10,7 +10,7 @@ from endoscope_core.physics.effect import Stage
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.audit import AuditReport
 from endoscope_explain.decide.conclusions import has_changed, verdict
-from endoscope_explain.decide.given_physics import GivenJoints
+from endoscope_explain.decide.decision import GivenJoints
 from endoscope_explain.explanation import (
     ChannelFit,
     Explanation,

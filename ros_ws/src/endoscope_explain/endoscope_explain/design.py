@@ -16,7 +16,6 @@ from functools import cached_property
 from itertools import permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_core.names import JOINTS
 from endoscope_core.physics.description import PlantDescription
@@ -24,10 +23,9 @@ from endoscope_core.physics.effects import KNOWN
 from endoscope_core.physics.simulator import TICK
 from endoscope_core.workers import parallel_map
 from endoscope_explain.case import ExplainedCase, NextExperiment
-from endoscope_explain.experiment_motions import SMALLEST, Segment, library
+from endoscope_explain.experiment_motions import SMALLEST, Segment, answer_to, is_safe, library
 from endoscope_explain.explanation import NamedEffect
 from endoscope_explain.fit.model import JointModel, jacobian
-from endoscope_explain.imagined_motion import answer_to, is_safe
 from endoscope_explain.observe.observation import JointObservation, commanded
 from endoscope_explain.observe.revisits import Visited
 from endoscope_explain.open_questions import (
@@ -40,11 +38,12 @@ from endoscope_explain.open_questions import (
     open_questions,
 )
 from endoscope_explain.prediction_set import NOTHING, OTHER_NUMBERS, SOMETHING_ELSE
-from endoscope_explain.recording import RigRecording
+from endoscope_explain.recording import Array, RigRecording
 
-Array = NDArray[np.float64]
 Played = Collection[tuple[str, str]]
 """Motions and the joints that they moved."""
+Changed = Callable[[PlantDescription, str], PlantDescription]
+"""Changes one joint of a plant."""
 
 MARGIN = 1.15
 """How far a proposed motion may go beyond the tensions and angles that were recorded."""
@@ -68,11 +67,8 @@ def what_is_asked(case: ExplainedCase) -> list['Asking']:
 def propose(
     case: ExplainedCase, asked: Sequence['Asking'], jobs: int = 1, played: Played = ()
 ) -> NextExperiment | None:
-    """Propose the motion that decides most per second of what is asked about a case.
-
-    Where nothing but a strength is open, the motion that narrows its interval. None where nothing
-    is, or where no safe motion, but those that were played, is expected to show enough.
-    """
+    """The motion that decides most per second of what is asked about a case, if any does."""
+    # Where nothing but a strength is open, it is the motion that narrows its interval.
     found = [best for each in asked if (best := each.best(jobs, played)) is not None]
     if found:
         return max(found, key=lambda each: each.per_second).experiment()
@@ -102,10 +98,11 @@ class _Law:
             for c in seen.channels
         }
 
-    def once(self, changed: Callable[[PlantDescription], PlantDescription], unknown: str) -> '_Law':
+    def once(self, changed: Changed, unknown: str) -> '_Law':
         """The law of a rig that was changed, of which one number is not known any more."""
-        plant, known = changed(self.plant), self.precision.copy()
-        base, flags, free = free_numbers(plant, self.model.observation.joint)
+        joint = self.model.observation.joint
+        plant, known = changed(self.plant, joint), self.precision.copy()
+        base, flags, free = free_numbers(plant, joint)
         for k, item in enumerate(free):
             if item.name == unknown:
                 # What the others are known to once that one may be anything (Schur complement).
@@ -231,9 +228,7 @@ class Asking(LawsOfJoint):
         column = self.recording.joints.index(self.question.joint)
         return Visited.by(commanded(self.recording)[:, column] / self.recording.gear)
 
-    def once(
-        self, changed: Callable[[PlantDescription], PlantDescription], unknown: str = ''
-    ) -> 'Asking':
+    def once(self, changed: Changed, unknown: str = '') -> 'Asking':
         """The same on a rig that was changed in a known way, but for one number of it."""
         laws = {name: law.once(changed, unknown) for name, law in self.laws.items()}
         return replace(self, laws=laws)
@@ -307,10 +302,8 @@ def _within(recording: RigRecording, joint: str) -> tuple[Segment, ...]:
 
 
 def _limits(recording: RigRecording) -> tuple[Array, Array, Array] | None:
-    """What the rig has been through: tensions (J, 2) in N, angles (J,) in rad, least tensions.
-
-    None where a joint was never seen.
-    """
+    """Tensions (J, 2) in N, angles (J,) in rad and least tensions that the rig has been through."""
+    # None where a joint was never seen.
     seen = recording.bending
     if not np.all(np.any(seen.valid, axis=0)):
         return None
@@ -355,12 +348,9 @@ def is_wide(effect: NamedEffect) -> bool:
 def narrow(
     case: ExplainedCase, effect: NamedEffect, jobs: int = 1, played: Played = ()
 ) -> NextExperiment | None:
-    """Propose the motion that narrows the interval of an effect's strength most per second.
-
-    None where no safe motion, but those that were played, is expected to halve it. The precision is
-    what the recordings and the motion have of it together, by white noise (Box, Lucas, Biometrika
-    46, 1959).
-    """
+    """The safe motion that halves the interval of a strength soonest; None where none does."""
+    # The precision is what the recordings and the motion have of it together, by white noise (Box,
+    # Lucas, Biometrika 46, 1959).
     recording, plant = case.recording, case.explanation.augmented
     law = _law(recording, plant, effect.joint)
     strength = [k for k, i in enumerate(law.model.free) if i.index == effect.definition.places[0]]

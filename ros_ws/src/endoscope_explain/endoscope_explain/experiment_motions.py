@@ -1,19 +1,18 @@
-"""Short motions of a joint, of which an experiment is chosen: each shows other physics."""
+"""Short motions of which an experiment is chosen, and what a plant would answer to one, safely."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from endoscope_core.physics.simulator import TICK
+from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.simulator import TICK, simulate
 from endoscope_core.rig import Rig
 from endoscope_core.safety import MotionLimits, MotionShaper
 from endoscope_core.signals import Signal, hold, move, sequence
 from endoscope_core.signals.motions import LOOP, chirp, multisine, ramps, steps_with_holds
-
-Array = NDArray[np.float64]
+from endoscope_explain.recording import Array, RigRecording, Series
 
 SAMPLE_S = 0.01
 SETTLES_S = 1.0
@@ -46,10 +45,7 @@ class Segment:
 
 
 def as_played(time: Array, angle: Array, rig: Rig, tick: float = TICK) -> tuple[Array, Array]:
-    """A motion (N, J) in rad at times (N,) as the console plays it: within a rig's limits.
-
-    It is shaped every `tick` s; the console does so every ms.
-    """
+    """A motion (N, J) in rad at times (N,) as the console plays it: within a rig's limits."""
     shaper = MotionShaper(_limits(rig, angle.shape[1]))
     ticks = np.arange(time[0], time[-1] + SETTLES_S, tick)
     wanted = np.stack([np.interp(ticks, time, column) for column in angle.T], axis=1)
@@ -68,12 +64,9 @@ def _limits(rig: Rig, joints: int) -> MotionLimits:
 # The same for every question about a rig.
 @lru_cache(maxsize=32)
 def library(joint: str, reaches: tuple[tuple[str, float], ...], rig: Rig) -> tuple[Segment, ...]:
-    """Motions of one of a rig's joints, each up to its reach in rad, as the rig plays them.
-
-    Where there are two joints that move, the other one is moved alone, too, and stands bent
-    meanwhile. Empty where the joint hardly moves; motions that the rig is too slow for are left
-    out.
-    """
+    """Motions of one of a rig's joints, each up to its reach in rad, as the rig plays them."""
+    # Where there are two joints that move, the other one is moved alone, too, and stands bent
+    # meanwhile. None where the joint hardly moves, and none that the rig is too slow for.
     joints, most = tuple(name for name, _ in reaches), dict(reaches)
     if most[joint] < LEAST_REACH:
         return ()
@@ -159,3 +152,42 @@ def _played(
     # Longer steps are ten times less work, where the rig does not take them for a stall.
     tick = SAMPLE_S if _limits(rig, len(joints)).longest_period >= SAMPLE_S else TICK
     return Segment(name, joint, *as_played(time, np.stack(columns, axis=1), rig, tick))
+
+
+def answer_to(
+    plant: PlantDescription, name: str, time: Array, angle: Array, rig: Rig
+) -> RigRecording:
+    """A plant's noise-free answer to a motion (N, J) in rad at times (N,)."""
+    # The tracker at its rate, all else every tick.
+    ticks = np.arange(0.0, time[-1], TICK)
+    desired = np.stack([np.interp(ticks, time, column) for column in angle.T], axis=1)
+    shaft = rig.joints.gear * desired
+    answer = simulate(plant, shaft)
+    slow = slice(None, None, max(1, round(1.0 / (plant.sensors.tracker_rate * TICK))))
+    return RigRecording(
+        name,
+        0.0,
+        plant.joint_names(),
+        Series.of('motor/servo_jp', ticks, shaft),
+        Series.of('wires/measured_js', ticks, answer.tension),
+        Series.of('slave/measured_js', ticks[slow], answer.bending[slow]),
+        Series.of('motor/measured_js', ticks, answer.shaft_position),
+        Series.of('motor/measured_js', ticks, answer.shaft_velocity),
+        Series.of('motor/measured_js', ticks, answer.shaft_effort),
+        rig=rig,
+    )
+
+
+def is_safe(
+    recording: RigRecording,
+    tension_limit: float | Array,
+    bending_limit: float | Array,
+    slack_limit: float | Array = 0.0,
+) -> bool:
+    """Whether an imagined motion stays within tensions in N, (J, 2), and angles in rad, (J,)."""
+    assert recording.tension is not None
+    return bool(
+        np.all(recording.tension.values <= tension_limit)
+        and np.all(recording.tension.values >= slack_limit)
+        and np.all(np.abs(recording.bending.values) <= bending_limit)
+    )

@@ -4,13 +4,13 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription
+from endoscope_core.physics.functions import FUNCTIONS
+from endoscope_core.physics.functions.places import OTHER_ANGLE
 from endoscope_core.physics.layout import IN_OTHER_JOINT
 from endoscope_core.workers import parallel_map
 from endoscope_explain.decide.conclusions import (
-    NOMINAL_UNITS,
     candidates,
     fitting,
     is_unknown,
@@ -22,8 +22,7 @@ from endoscope_explain.decide.conclusions import (
     refitted,
     verdict,
 )
-from endoscope_explain.decide.decision import Decision, decide
-from endoscope_explain.decide.given_physics import GivenJoints, explained_by
+from endoscope_explain.decide.decision import Decision, GivenJoints, decide, explained_by
 from endoscope_explain.explanation import Explanation, Verdict
 from endoscope_explain.fit.intervals import nominal_estimates
 from endoscope_explain.fit.model import Fit, packed_joint
@@ -37,12 +36,14 @@ from endoscope_explain.fit.nominal import (
 )
 from endoscope_explain.observe.observation import JointObservation, observe, with_held_noise
 from endoscope_explain.options import BAND, MOST_EFFECTS
-from endoscope_explain.recording import LEAST_DURATION_S, MOVES_RAD, RigRecording
-from endoscope_explain.search.levels import JointSearch, search
-from endoscope_explain.search.other_joint import stands_beside
+from endoscope_explain.recording import LEAST_DURATION_S, MOVES_RAD, Array, RigRecording
+from endoscope_explain.search.expansion import addable
+from endoscope_explain.search.levels import JointSearch, Level, search
+from endoscope_explain.search.null_rigs import NEAR
 from endoscope_explain.search.refit import Candidate
+from endoscope_explain.search.screen import background, directions, gains
+from endoscope_explain.search.term import Term
 
-Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 SAME_RIG = 0.03
@@ -67,10 +68,8 @@ def explain_recording(
     jobs: int = 2,
     progress: Progress | None = None,
 ) -> Explanation:
-    """Explain why a recording differs from the simulation of a plant.
-
-    What is `known` of a joint, names from other recordings of the rig, is fitted in any case.
-    """
+    """Explain why a recording differs from the simulation of a plant."""
+    # What is `known` of a joint, names from other recordings of the rig, is fitted in any case.
     report = progress or (lambda _: None)
     observations = tuple(o for o in with_held_noise(observe(recording, plant)) if o.channels)
     if not _is_enough(observations):
@@ -105,7 +104,7 @@ def explain_recording(
         ),
         effects=effects,
         parameters={
-            joint: nominal_estimates(d.chosen.fit, packed_joint(plant, joint)[0], NOMINAL_UNITS)
+            joint: nominal_estimates(d.chosen.fit, packed_joint(plant, joint)[0])
             for joint, d in of_joint.items()
         },
         nominal=plant,
@@ -197,3 +196,38 @@ def _is_enough(observations: tuple[JointObservation, ...]) -> bool:
         and all(np.ptp(c.value) >= MOVES_RAD for c in o.channels if c.quantity == 'shaft_position')
         for o in observations
     )
+
+
+_PLACES = frozenset(place.id for place in FUNCTIONS.values() if place.argument is OTHER_ANGLE)
+
+
+def depends_on_other(term: Term) -> bool:
+    """Whether a term depends on the other joint's angle."""
+    return term.id in _PLACES or bool(_PLACES & set(term.effect.traits.families))
+
+
+def stands_beside(tried: JointSearch, angle: Array, left_out: tuple[str, ...], jobs: int) -> bool:
+    """Whether a search would find the same beside the other joint's angle (N,) in rad."""
+    # Few terms depend on the other joint. Without one of them among what was found all else stands
+    # as it is fitted, and only these are looked at again.
+    found = [tried.found, *(level.best for level in tried.levels if level.found)]
+    if any(depends_on_other(term) for one in found for term in one.terms):
+        return False
+    return all(_gain_beside(level, angle, left_out, jobs) < _least(level) for level in tried.levels)
+
+
+def _least(level: Level) -> float:
+    """Gain by the screen from which on a term might be found in place of the level's best."""
+    # A fit may double what the screen shows of it.
+    return NEAR * max(level.gain(level.best), 0.0) if level.found else 0.0
+
+
+def _gain_beside(level: Level, angle: Array, left_out: tuple[str, ...], jobs: int) -> float:
+    """Largest gain by the screen of what depends on the other joint."""
+    parent = level.parent.fit
+    observation = parent.model.observation.beside(angle)
+    behind = background(replace(parent, model=replace(parent.model, observation=observation)))
+    terms = [term for term in addable(behind, left_out) if depends_on_other(term)]
+    ways = directions(behind, tuple(terms), jobs)
+    residuals = behind.left(parent.residuals * behind.weight)[:, None]
+    return float(np.max(gains(behind, ways, residuals).values, initial=0.0))

@@ -6,20 +6,13 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_core.physics.description import PlantDescription, TermSpec
 from endoscope_core.physics.effect import Effect
 from endoscope_core.physics.effects import describe
 from endoscope_core.physics.functions import FUNCTIONS
 from endoscope_core.physics.functions.places import Place
-from endoscope_explain.prediction_set import (
-    OTHER_NUMBERS,
-    Contest,
-    Posterior,
-)
-
-Array = NDArray[np.float64]
+from endoscope_explain.prediction_set import OTHER_NUMBERS, Array, Contest, Posterior
 
 NINETY_PERCENT = 1.645
 """Standard deviations that hold 90 % of a normal distribution, either way."""
@@ -185,14 +178,16 @@ class Explanation:
 
     # Without the audit's findings: a caller that found a fault of the recording overrides it.
     verdict: Verdict
-    effects: tuple[NamedEffect, ...]  # what was left out, most certain first; empty if nothing was
+    # What was left out, most certain first; empty if nothing was.
+    effects: tuple[NamedEffect, ...] = ()
     # Nominal parameters of the final fit, by joint and parameter.
-    parameters: Mapping[str, Mapping[str, NominalEstimate]]
+    parameters: Mapping[str, Mapping[str, NominalEstimate]] = field(default_factory=dict)
     nominal: PlantDescription  # as given
     refitted: PlantDescription  # with its parameters refitted
     augmented: PlantDescription  # with the named effects
     # By 'nominal', 'refitted', 'augmented' and signal, written `wires/measured_js:wire_x_pos`.
-    fit: Mapping[str, Mapping[str, ChannelFit]]
+    # Empty where nothing may be fitted, or nothing can be.
+    fit: Mapping[str, Mapping[str, ChannelFit]] = field(default_factory=dict)
     candidates: tuple[Tried, ...] = ()  # candidates that were refitted, best first
     unknown: UnknownTerm | None = None  # the missing term for `unknown_physics`
     # Joint and place of functions of the augmented plant that are no finding: they repair what
@@ -219,12 +214,4 @@ class Explanation:
     @staticmethod
     def without_fit(verdict: Verdict, plant: PlantDescription) -> 'Explanation':
         """The answer where nothing may be fitted, or nothing can be."""
-        return Explanation(
-            verdict=verdict,
-            effects=(),
-            parameters={},
-            nominal=plant,
-            refitted=plant,
-            augmented=plant,
-            fit={},
-        )
+        return Explanation(verdict=verdict, nominal=plant, refitted=plant, augmented=plant)

@@ -15,7 +15,7 @@ from endoscope_explain.case import ExplainedCase, Sources
 from endoscope_explain.pipeline import Progress, explain_case, read_inputs
 from endoscope_explain.report.sentences import terminal_text, verdict_sentence
 from endoscope_explain.report.writing import REPORT_HTML, provenance, write_report
-from endoscope_explain.shared_physics import physics_of_all
+from endoscope_explain.takes import physics_of_all
 
 SUMMARY_CSV = 'summary.csv'
 PARAMETERS_CSV = 'parameters.csv'
@@ -54,10 +54,7 @@ def explained_case(sources: Sources, progress: Progress | None = None) -> Explai
 def explained_cases(
     sources: Sequence[Sources], progress: Progress | None = None
 ) -> list[ExplainedCase]:
-    """Explain bags side by side, of one rig where they have the `same_physics`.
-
-    EndoscopeError if a recording cannot be used, or what was asked for does not go together.
-    """
+    """Explain bags side by side, of one rig where they have the `same_physics`."""
     sources = _prepared(sources, progress)
     cases: dict[int, ExplainedCase] = {}
     for index, case in _as_they_come(sources, progress):
@@ -70,12 +67,8 @@ def explained_cases(
 def explain_bags(
     sources: Sequence[Sources], out: Path, *, say: Say = print, progress: Progress | None = None
 ) -> dict[str, Content]:
-    """Explain bags and write their reports by the bag's name, all or none; what they contain.
-
-    `out` is new or empty: one report's own folder, or that of one folder for each bag. With
-    `same_physics` all bags show one rig, and one choice of effects has to explain all of them.
-    Nothing is written where a recording or the folder cannot be used (EndoscopeError).
-    """
+    """Explain bags and write their reports to a folder, all or none; what these contain."""
+    # One report has the folder to itself, else each has its own in it.
     require_free_directory(out)
     sources = _prepared(sources, progress or say)
     names, alone = unique_names([one.bag for one in sources]), len(sources) == 1

@@ -22,7 +22,6 @@ from endoscope_explain.fit.free_parameters import (
 from endoscope_explain.fit.model import (
     Array,
     Fit,
-    Flags,
     JointModel,
     fit,
     joint_of,
@@ -33,7 +32,7 @@ from endoscope_explain.fit.nominal import with_any_numbers
 from endoscope_explain.observe.observation import JointObservation, observe, with_held_noise
 from endoscope_explain.options import BAND
 from endoscope_explain.prediction_set import NOTHING, OTHER_NUMBERS, SOMETHING_ELSE, Contest
-from endoscope_explain.recording import RigRecording
+from endoscope_explain.recording import Mask, RigRecording
 from endoscope_explain.search.screen import background, directions, screened
 from endoscope_explain.search.term import Term, starting_points
 
@@ -63,11 +62,9 @@ class OpenQuestion:
     def brings(
         self, apart: Mapping[tuple[str, str], float], duration: float
     ) -> tuple[float, float]:
-        """Evidence that a motion of `duration` s is expected to bring, in nats as it is read.
-
-        `apart` is the evidence in nats of a law that is true over another one. Also, per second,
-        what of it brings the true one no further than `DECIDED`.
-        """
+        """Evidence in nats, as it is read, expected of a motion of `duration` s, and per second."""
+        # `apart` is the evidence in nats of a law that is true over another one. Per second counts
+        # what of it brings the true one no further than `DECIDED`.
         temperature = self.temperature(duration)
         whole = useful = 0.0
         total = sum(self.chances.values())
@@ -106,10 +103,8 @@ def _chances(contest: Contest, named: str) -> dict[str, float]:
 
 
 def fitted_laws(case: ExplainedCase, question: OpenQuestion) -> dict[str, PlantDescription]:
-    """A plant of each law that can be simulated, fitted to the recordings, by its name.
-
-    Without what was named there is nothing to compare: empty where the improved plant lacks it.
-    """
+    """A plant of each law that can be simulated, fitted to the recordings, by its name."""
+    # Without what was named there is nothing to compare: empty where the improved plant lacks it.
     plant = case.explanation.augmented
     named, joint = next(iter(question.chances)), question.joint
     there = {spec.id for spec in plant.effects if spec.joint == joint}
@@ -158,7 +153,7 @@ def observed(recording: RigRecording, plant: PlantDescription, joint: str) -> Jo
 
 def free_numbers(
     plant: PlantDescription, joint: str, band: float = BAND
-) -> tuple[Array, Flags, tuple[FreeParameter, ...]]:
+) -> tuple[Array, Mask, tuple[FreeParameter, ...]]:
     """Packed parameters and flags of a joint of a plant, and what is free: its effects', too."""
     base, flags = packed_joint(plant, joint)
     free = nominal_parameters(base, band)

@@ -2,25 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Protocol
 
 from endoscope_core.physics.description import PlantDescription
-from endoscope_explain.design import LEAST_NATS, Asking
+from endoscope_explain.design import LEAST_NATS, Asking, Changed
 from endoscope_explain.prediction_set import SOMETHING_ELSE
 
 WEIGHT_NM = 9.81 * 0.005 * 0.03
 """Moment of 5 g at 30 mm: a third of what bends a section like the described one by a radian."""
 BEND = 1.5
 """Share of its bend that a tube in another shape has."""
-
-
-class Changed(Protocol):
-    """Changes one joint of a plant."""
-
-    def __call__(self, plant: PlantDescription, joint: str) -> PlantDescription:
-        """The changed plant."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -60,13 +50,11 @@ def what_would_decide(asked: Sequence[Asking], jobs: int = 1) -> str:
     for asking in asked:
         if len(asking.laws) < 2:
             continue
-        joint = asking.question.joint
         names = ' and '.join(name for name in asking.question.chances if name != SOMETHING_ELSE)
         unchanged = asking.best(jobs, ())
         least = LEAST_NATS + (0.0 if unchanged is None else unchanged.nats)
         for change in CHANGES:
-            changed = partial(change.changed, joint=joint)
-            best = asking.once(changed, change.unknown).best(jobs, ())
+            best = asking.once(change.changed, change.unknown).best(jobs, ())
             # What a motion is expected to bring without the change is not due to it.
             if best is not None and best.nats >= least:
                 return (

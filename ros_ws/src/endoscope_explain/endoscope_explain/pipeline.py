@@ -11,7 +11,6 @@ from endoscope_bags.errors import BagError
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit import AuditReport, audit_recording
 from endoscope_explain.case import (
-    ChainCut,
     ExplainedCase,
     Inputs,
     Mismatch,
@@ -24,8 +23,7 @@ from endoscope_explain.compare import confirmed_by, ladders
 from endoscope_explain.design import propose, what_is_asked
 from endoscope_explain.explain_recording import Progress, explain_recording
 from endoscope_explain.explanation import Explanation, Verdict
-from endoscope_explain.fit.between_rows import with_command_between_rows
-from endoscope_explain.fit.nominal import with_isolated_marked
+from endoscope_explain.fit.nominal import with_command_between_rows, with_isolated_marked
 from endoscope_explain.locate.locating import (
     cut_at_motor,
     locate_effects,
@@ -33,11 +31,7 @@ from endoscope_explain.locate.locating import (
     locate_parameters,
     locate_unknown,
 )
-from endoscope_explain.recording import (
-    RigRecording,
-    recording_from_bag,
-    with_unrecorded,
-)
+from endoscope_explain.recording import RigRecording, recording_from_bag, with_unrecorded
 
 Engine = Callable[..., Explanation]
 
@@ -128,7 +122,8 @@ def explain_case(
         plant=with_unrecorded(plant, sources.plant),
         ladder={},
     )
-    case = replace(case, places=_places(case), cuts=_cuts(case))
+    cuts = cut_at_motor(case.recording, explanation.refitted) if explanation.fit else ()
+    case = replace(case, places=_places(case), cuts=cuts)
     if answered is not None:
         answered(case)
     if explanation.fit and not sources.quick:
@@ -136,11 +131,6 @@ def explain_case(
         case = replace(case, next_experiment=propose(case, what_is_asked(case), sources.jobs))
     held_out, second = ladders(explanation, validation)
     return replace(case, ladder=held_out, validation=second, runtime_s=time.monotonic() - begun)
-
-
-def _cuts(case: ExplainedCase) -> tuple[ChainCut, ...]:
-    fitted = case.explanation.fit
-    return cut_at_motor(case.recording, case.explanation.refitted) if fitted else ()
 
 
 def _places(case: ExplainedCase) -> tuple[Mismatch, ...]:

@@ -113,10 +113,8 @@ def log_odds(
     beyond_form: ArrayLike,
     weights: Sequence[float],
 ) -> Array:
-    """Logarithm (m, k + 2) of the odds of names, of nothing, and of something else.
-
-    Of m contests, as in `Contest`; `gains` (m, k) are minus infinity where there is no name.
-    """
+    """Logarithm (m, k + 2) of the odds of names, nothing and something else, of m contests."""
+    # `gains` (m, k) are minus infinity where there is no name.
     w, gained = np.array(weights), np.array(gains, dtype=float)
     top = np.max(gained, axis=1, initial=0.0)
     left = np.log1p(np.array(beyond_form))

@@ -119,8 +119,7 @@ class RigRecording:
 
     def measured(self) -> dict[str, Series]:
         """Return the recorded measured series by their name in this class."""
-        names = ('shaft_position', 'shaft_velocity', 'shaft_effort', 'tension', 'bending')
-        return {name: s for name in names if (s := getattr(self, name)) is not None}
+        return {name: s for name in QUANTITY_TOPICS if (s := getattr(self, name)) is not None}
 
     def with_series(self, changed: Mapping[str, Series]) -> 'RigRecording':
         """Return the same recording with some series, by name, replaced."""
@@ -247,12 +246,9 @@ def recording_from_bag(
     namespace: str | None = None,
     rig: Rig | None = None,
 ) -> RigRecording:
-    """Read what analysis needs from a bag, in the order in which it was recorded.
-
-    It has the joints of the plant that all topics have, and notes of what is missing. Topics of
-    `without`, some of `WAIVABLE`, may be missing. BagError if the bag or its stamps cannot be used,
-    FileError if the rig that it carries cannot be read.
-    """
+    """What analysis needs of a bag, in the order in which it was recorded; BagError if unusable."""
+    # It has the joints of the plant that all topics have, and notes of what is missing. Topics of
+    # `without`, some of `WAIVABLE`, may be missing.
     bag = open_bag(path)
     rig = rig or rig_of_bag(bag)
     lacking = [t for t in (WIRES, BENDING, MOTOR) if not bag.has(t, namespace)]
@@ -272,30 +268,28 @@ def recording_from_bag(
         notes.extend(left_out)
         return series
 
-    command = read(commanded, 'position')
-    command_names = {j: motor_name(j) for j in plant.joints}
+    def names_of(topic: str, joint: str) -> tuple[str, ...]:
+        if topic == WIRES:
+            return wire_names(joint)
+        return (joint if topic in (BENDING, DESIRED) else motor_name(joint),)
+
+    recorded = {commanded: read(commanded, 'position')}
     if commanded == DESIRED:
-        command_names = {j: j for j in plant.joints}
         notes.append(
             f'{COMMAND} was not recorded: {DESIRED} times the gear, {rig.joints.gear:g}, is taken '
             'for it'
         )
-    bending = read(BENDING, 'position')
-    wires = None if WIRES in lacking else read(WIRES, 'effort')
-    motor = None if MOTOR in lacking else read(MOTOR, 'position')
+    for topic in (BENDING, *(t for t in (WIRES, MOTOR) if t not in lacking)):
+        recorded[topic] = read(topic, 'effort' if topic == WIRES else 'position')
 
-    has = {
-        joint: [
-            (command, [command_names[joint]]),
-            (bending, [joint]),
-            *([] if wires is None else [(wires, list(wire_names(joint)))]),
-            *([] if motor is None else [(motor, [motor_name(joint)])]),
-        ]
-        for joint in plant.joints
-    }
     joints = []
-    for joint, needed in has.items():
-        absent = [f'{s.topic} has no {n}' for s, names in needed for n in names if n not in s.names]
+    for joint in plant.joints:
+        absent = [
+            f'{one.topic} has no {name}'
+            for topic, one in recorded.items()
+            for name in names_of(topic, joint)
+            if name not in one.names
+        ]
         if absent:
             notes.append(f'{joint} is left out: ' + ', '.join(absent))
         else:
@@ -303,16 +297,17 @@ def recording_from_bag(
     if not joints:
         raise BagError(f'{path}: no joint is complete: ' + '; '.join(notes))
 
-    every = [s for s in (command, wires, bending, motor) if s is not None]
+    every = [recorded[t] for t in (commanded, WIRES, BENDING, MOTOR) if t in recorded]
     require_common_time(path, every)
     counted = counted_losses(bag)
     origin_ns = min(int(s.stamp_ns.min()) for s in every)
 
-    def series(topic: str, source: JointStateSeries, names: Sequence[str], key: str) -> Series:
-        chosen = source.select(names)
+    def series(topic: str, key: str) -> Series:
+        source = recorded[topic]
+        chosen = source.select([name for joint in joints for name in names_of(topic, joint)])
         values = chosen.require(key)
         time = np.asarray((chosen.stamp_ns - origin_ns) * 1e-9, dtype=np.float64)
-        if key == 'effort' and topic == WIRES:
+        if topic == WIRES:
             values = values.reshape(len(values), len(joints), 2)
         received = np.asarray((chosen.log_ns - origin_ns) * 1e-9, dtype=np.float64)
         lost = None
@@ -322,25 +317,23 @@ def recording_from_bag(
         made = Series.of(topic, time, np.ascontiguousarray(values), received)
         return replace(made, lost=lost)
 
-    shaft = series(commanded, command, [command_names[j] for j in joints], 'position')
+    shaft = series(commanded, 'position')
     if commanded == DESIRED:
         shaft = replace(shaft, values=shaft.values * rig.joints.gear)
-    motors = dict.fromkeys(('position', 'velocity', 'effort'))
-    if motor is not None:
-        for key in motors:
-            if getattr(motor, key) is None:
-                notes.append(f'{MOTOR} has no {key}')
-                continue
-            motor.check_finite([key])
-            motors[key] = series(MOTOR, motor, [motor_name(j) for j in joints], key)
-    wire_list = [w for j in joints for w in wire_names(j)]
+    motors = dict[str, Series | None].fromkeys(('position', 'velocity', 'effort'))
+    for key in motors if MOTOR in recorded else ():
+        if getattr(recorded[MOTOR], key) is None:
+            notes.append(f'{MOTOR} has no {key}')
+            continue
+        recorded[MOTOR].check_finite([key])
+        motors[key] = series(MOTOR, key)
     return RigRecording(
         name=Path(path).name.removesuffix('.mcap'),
         origin=origin_ns * 1e-9,
         joints=tuple(joints),
         command=shaft,
-        tension=None if wires is None else series(WIRES, wires, wire_list, 'effort'),
-        bending=series(BENDING, bending, joints, 'position'),
+        tension=series(WIRES, 'effort') if WIRES in recorded else None,
+        bending=series(BENDING, 'position'),
         shaft_position=motors['position'],
         shaft_velocity=motors['velocity'],
         shaft_effort=motors['effort'],

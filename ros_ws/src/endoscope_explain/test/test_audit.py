@@ -5,8 +5,8 @@ import pytest
 
 from endoscope_core.physics.description import PlantDescription
 from endoscope_explain.audit import Severity, audit_recording
+from endoscope_explain.audit.examined import retimed
 from endoscope_explain.audit.findings.stray_poses import spike_chance
-from endoscope_explain.audit.stamps import retimed
 
 PLANT = PlantDescription()
 

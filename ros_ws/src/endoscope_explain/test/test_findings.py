@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from endoscope_core.physics.description import PlantDescription
-from endoscope_explain.audit import audit_recording
-from endoscope_explain.audit.auditing import KINDS
+from endoscope_explain.audit import STEPS, audit_recording
+from endoscope_explain.audit.finding import FindingKind
 from endoscope_explain.audit.findings import (
     clock_rate,
     earlier_motion,
@@ -27,6 +27,9 @@ from endoscope_explain.audit.findings import (
 )
 
 PLANT = PlantDescription()
+KINDS = tuple(
+    kind for step in STEPS for kind in vars(step).values() if isinstance(kind, FindingKind)
+)
 MOTOR = ('shaft_position', 'shaft_velocity', 'shaft_effort')
 
 

@@ -33,7 +33,7 @@ from endoscope_explain.investigation.motions import (
 from endoscope_explain.observe.revisits import EVERY_S, LEAST_SHARE, seen_before, strokes
 from endoscope_explain.pipeline import explain_case
 from endoscope_explain.prediction_set import Contest
-from endoscope_explain.report.visited_once import once_only
+from endoscope_explain.report.left_open import once_only
 from endoscope_explain.takes import inputs_joined
 
 pytestmark = pytest.mark.engine

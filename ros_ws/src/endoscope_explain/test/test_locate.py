@@ -5,7 +5,7 @@ import pytest
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription, TermSpec
 from endoscope_explain.explanation import Estimate, Explanation, NamedEffect, Verdict
-from endoscope_explain.locate.conditions import information
+from endoscope_explain.locate.excess import information
 from endoscope_explain.locate.locating import cut_at_motor, locate_effects, locate_unknown
 
 PLANT = PlantDescription()

@@ -10,9 +10,8 @@ from endoscope_explain import design, operator_changes
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.case import ExplainedCase, Inputs, Sources
 from endoscope_explain.design import Asking, propose, what_is_asked
-from endoscope_explain.experiment_motions import library
+from endoscope_explain.experiment_motions import answer_to, is_safe, library
 from endoscope_explain.explanation import Explanation, NamedEffect, Verdict
-from endoscope_explain.imagined_motion import answer_to, is_safe
 from endoscope_explain.observe.observation import commanded
 from endoscope_explain.observe.revisits import Visited
 from endoscope_explain.open_questions import DECIDED, OpenQuestion, fitted_laws, open_questions
@@ -279,7 +278,7 @@ def test_a_number_that_is_not_known_any_more_leaves_the_others_less_known(asking
     names = [item.name for item in law.model.free]
     k = names.index('capstan_exponent')
     before = np.linalg.inv(law.precision)
-    changed = law.once(lambda plant: plant, 'capstan_exponent')
+    changed = law.once(lambda plant, joint: plant, 'capstan_exponent')
     after = np.linalg.inv(changed.precision)
     others = [i for i in range(len(names)) if i != k]
     np.testing.assert_allclose(

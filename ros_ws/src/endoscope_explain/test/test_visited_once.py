@@ -6,8 +6,8 @@ import pytest
 
 from endoscope_explain.observe.revisits import Stroke
 from endoscope_explain.report.html_page import html_page
+from endoscope_explain.report.left_open import MOTION, once_only, visited_once
 from endoscope_explain.report.sentences import terminal_text
-from endoscope_explain.report.visited_once import MOTION, once_only, visited_once
 from endoscope_explain.report.writing import report_mapping
 
 

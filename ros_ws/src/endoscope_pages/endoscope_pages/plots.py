@@ -42,12 +42,9 @@ _ACTIONS = (
 
 
 def banded(x: Array, y: Array) -> tuple[Array, Array, Array]:
-    """Return edges (K + 1,) of stretches, and the least and greatest of y (K,) in each.
-
-    Of x (N,), increasing, neighbours share a reading, so that the band is as connected as the line
-    through all readings, and none of these lies outside. NaN in y (N,) is left out; a stretch of
-    nothing else is NaN.
-    """
+    """Edges (K + 1,) of stretches of x (N,), increasing, and least and greatest y (K,) in each."""
+    # Neighbours share a reading, so that the band is as connected as the line through all readings,
+    # and none of these lies outside. NaN in y is left out; a stretch of nothing else is NaN.
     step = math.ceil((len(y) - 1) / MOST_BINS)
     begins = np.arange(0, len(y) - 1, step)
     ends = np.minimum(begins + step, len(y) - 1)
@@ -57,10 +54,7 @@ def banded(x: Array, y: Array) -> tuple[Array, Array, Array]:
 
 
 def decimated(x: Array, y: Array) -> NDArray[np.intp]:
-    """Indices of readings that stand for all readings of a loop.
-
-    Of x and y (N,), of each stretch in time the first, the last, and the least and greatest.
-    """
+    """Indices of the first, last, least and greatest readings of each stretch of a loop in time."""
     step = math.ceil(2 * len(y) / MOST_READINGS)
     while len(kept := _extremes(x, y, step)) > MOST_READINGS:
         step += math.ceil(step / 4)

@@ -44,8 +44,8 @@ def run(args: argparse.Namespace) -> int:
     # Before anything is imported that takes seconds.
     shapes = 'both shapes' if args.tube == 'both' else f'the {args.tube} shape'
     progress(f'calibrating and moving a simulated endoscope in {shapes} of the colon')
-    from endoscope_bringup.demo import sentences
     from endoscope_bringup.demo.procedure import TUBES
+    from endoscope_bringup.demo.report_page import headline
     from endoscope_bringup.demo.results import figures_table, table_rows
     from endoscope_bringup.demo.run_demo import REPORT, run_demo
     from endoscope_core.atomic_output import atomic_directory
@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
         )
     rows = table_rows(results)
     print(figures_table(rows))
-    print(f'{sentences.headline(rows)}.')
+    print(f'{headline(rows)}.')
     print(f'report and recordings: {out / REPORT}')
     return 0
 

@@ -47,14 +47,11 @@ def run(args: argparse.Namespace) -> int:
         reboot(ports[0], bauds[0], args.reboot)
         print(f'{ports[0]}: servo {args.reboot} restarts')
         return 0
-    if args.json:
-        findings = [examine(port, bauds) for port in ports]
-        print_json([asdict(finding) for finding in findings])
-        return 1 if not ports or any(finding.advice for finding in findings) else 0
-    if not ports:
-        print('no serial port: plug the adapter in, or name one with --port')
-        return 1
     findings = [examine(port, bauds) for port in ports]
-    for finding in findings:
-        print(finding)
-    return 1 if any(finding.advice for finding in findings) else 0
+    if args.json:
+        print_json([asdict(finding) for finding in findings])
+    elif not ports:
+        print('no serial port: plug the adapter in, or name one with --port')
+    else:
+        print(*findings, sep='\n')
+    return 1 if not ports or any(finding.advice for finding in findings) else 0

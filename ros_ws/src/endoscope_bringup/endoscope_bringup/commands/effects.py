@@ -50,7 +50,9 @@ def run(args: argparse.Namespace) -> int:
         return 0
     if chosen:
         texts = [
-            _place_text(FUNCTIONS[each.id]) if each.id in FUNCTIONS else _effect_text(each)
+            _place_text(FUNCTIONS[each.id])
+            if each.id in FUNCTIONS
+            else '\n'.join([*_heading(each), *map(_parameter, each.parameters)])
             for each in chosen
         ]
         print('\n\n'.join(texts))
@@ -111,10 +113,6 @@ def _as_json(definition: 'Effect') -> dict[str, object]:
             for parameter in definition.parameters
         ],
     }
-
-
-def _effect_text(definition: 'Effect') -> str:
-    return '\n'.join([*_heading(definition), *(_parameter(p) for p in definition.parameters)])
 
 
 def _heading(definition: 'Effect') -> list[str]:

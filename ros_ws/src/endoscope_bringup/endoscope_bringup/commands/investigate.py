@@ -1,16 +1,20 @@
 """`endoscope investigate`: moves a rig, explains it, and plays discriminating experiments."""
 
 import argparse
+import json
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from endoscope_bringup.subcommands import add_options, within
+from endoscope_core.errors import EndoscopeError, NotPlayedError, RigStoppedError
 from endoscope_explain.options import Options
 
 if TYPE_CHECKING:
     from endoscope_core.rig import Rig
+    from endoscope_explain.investigation.motions import RigMotion
     from endoscope_nodes.client.graph_client import GraphClient
 
 LOOKS_S = 3.0
@@ -79,12 +83,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Investigate; return 1 if the rig or a person stopped it."""
-    import sys
     from functools import partial
 
     from endoscope_bringup.operating.actions import paused_when_interrupted
-    from endoscope_bringup.operating.motions_by_lines import MotionsByLines
-    from endoscope_core.errors import EndoscopeError
     from endoscope_core.investigation_folder import PAGE, held
     from endoscope_core.rig import load_rig
     from endoscope_explain.investigation import index_page
@@ -103,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
     begun(of.folder, of.plant_file)
     step = partial(print, file=sys.stderr, flush=True)
 
-    def investigated(player: MotionPlayer | MotionsByLines, say: Callable[[str], None]) -> Log:
+    def investigated(player: MotionPlayer | _MotionsByLines, say: Callable[[str], None]) -> Log:
         return investigate(
             of,
             player.play,
@@ -115,7 +116,7 @@ def run(args: argparse.Namespace) -> int:
 
     with held(of.folder):
         if args.lines:
-            lines = MotionsByLines(sys.stdout, sys.stdin)
+            lines = _MotionsByLines()
             log = investigated(lines, lines.say)
         else:
             say = partial(print, flush=True)
@@ -161,3 +162,37 @@ def _graph(args: argparse.Namespace, rig: 'Rig') -> Iterator['GraphClient']:
     nodes = (*NODES, RecorderNode)
     with LiveGraph(None, lock_step=True, overrides=overrides, rig=rig, nodes=nodes) as graph:
         yield graph.client
+
+
+class _MotionsByLines:
+    """Another program plays the motions: a request and its outcome are each a line of JSON."""
+
+    def say(self, sentence: str) -> None:
+        """Write a sentence of the log."""
+        self._write({'say': sentence})
+
+    def play(self, motion: 'RigMotion', file: Path, bag: Path, plant: Path | None = None) -> None:
+        """Have a motion played and recorded; see `endoscope_nodes.client.motion_player`."""
+        asked = {
+            'words': motion.words,
+            'why': motion.why,
+            'duration': motion.duration,
+            'file': str(file.absolute()),
+            'bag': str(bag.absolute()),
+            'plant': '' if plant is None else str(plant.absolute()),
+        }
+        self._write({'play': asked})
+        line = sys.stdin.readline()
+        if not line:
+            raise NotPlayedError('the program that plays the motions has ended')
+        answer = json.loads(line)
+        became, why = answer['became'], answer['why']
+        if became == 'not_played':
+            raise NotPlayedError(why)
+        if became == 'rig_stopped':
+            raise RigStoppedError(why)
+        if became != 'played':
+            raise EndoscopeError(why)
+
+    def _write(self, message: dict[str, object]) -> None:
+        print(json.dumps(message), flush=True)

@@ -30,11 +30,9 @@ NODES = (*SLAVE_NODES, *CONTROL_NODES)
 
 
 class LiveGraph(ClosedOnExit):
-    """All nodes, recorder included, in this process.
+    """All nodes, recorder included, in this process; with a bag it records until :meth:`stop`."""
 
-    The recording lasts from the beginning to :meth:`stop`; there is none without a bag. In
-    lock-step simulated time goes on as the nodes follow, else the wall clock gives it.
-    """
+    # In lock-step simulated time goes on as the nodes follow, else the wall clock gives it.
 
     def __init__(
         self,

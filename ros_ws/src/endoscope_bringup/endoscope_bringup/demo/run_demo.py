@@ -11,10 +11,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from endoscope_bringup.demo.analysis import analyse
 from endoscope_bringup.demo.procedure import TUBES, RecordedTube, Tube
 from endoscope_bringup.demo.report_page import report_page
-from endoscope_bringup.demo.results import DemoResults, table_rows
+from endoscope_bringup.demo.results import DemoResults, analyse, table_rows
 from endoscope_core.atomic_output import write_text
 from endoscope_core.workers import worker_pool
 
@@ -33,13 +32,14 @@ def run_demo(
     real_time: bool,
     progress: Callable[[str], None],
 ) -> DemoResults:
-    """Run the procedure on every tube; bags, plants, figures and report go into an existing folder.
-
-    The same seed of the sensors' noise gives the same bags, unless `real_time` runs by the wall
-    clock instead of in lock-step on /clock. `progress` must be picklable.
-    """
+    """Run the procedure on every tube; all that is written goes into an existing folder."""
+    # The same seed of the sensors' noise gives the same bags, unless `real_time` runs by the wall
+    # clock instead of in lock-step on /clock. `progress` must be picklable.
     began = time.monotonic()
-    recordings = _run_tubes(folder, tubes, seed, real_time, progress)
+    progress('loading the nodes, which takes some seconds')
+    procedure = partial(_run_tube, folder=folder, seed=seed, real_time=real_time, progress=progress)
+    # Graphs that share two cores would be late by the wall clock.
+    recordings = _run_tubes(tubes, procedure, side_by_side=not real_time)
     progress('reading the recordings back and drawing the report')
     results = analyse(
         {tube.name: made.bag for tube, made in zip(tubes, recordings, strict=True)},
@@ -72,18 +72,11 @@ def run_demo(
 
 
 def _run_tubes(
-    folder: Path,
-    tubes: Sequence[Tube],
-    seed: int,
-    real_time: bool,
-    progress: Callable[[str], None],
+    tubes: Sequence[Tube], procedure: Callable[..., RecordedTube], side_by_side: bool
 ) -> list[RecordedTube]:
-    """Run tubes side by side in processes of their own, each in its own ROS domain."""
-    progress('loading the nodes, which takes some seconds')
+    """Run tubes, side by side in processes of their own, each in its own ROS domain."""
     here = int(os.environ.get('ROS_DOMAIN_ID', '0'))
-    procedure = partial(_run_tube, folder=folder, seed=seed, real_time=real_time, progress=progress)
-    # Graphs that share two cores would be late by the wall clock.
-    if real_time or len(tubes) == 1:
+    if not side_by_side or len(tubes) == 1:
         return [procedure(tube, domain=here) for tube in tubes]
     with worker_pool(len(tubes)) as pool:
         runs = [

@@ -18,17 +18,7 @@ from endoscope_nodes.client.graph_listener import (
     WATCH,
     Health,
 )
-from endoscope_nodes.names import (
-    BAG,
-    CEILING,
-    FACTOR,
-    GEAR,
-    JOINTS,
-    REACH,
-    RIG_KIND,
-    SPEED,
-    TIME,
-)
+from endoscope_nodes.names import BAG, CEILING, FACTOR, GEAR, JOINTS, REACH, RIG_KIND, SPEED, TIME
 from endoscope_nodes.program import NODES
 
 _LEVELS = ('ok', 'WARN', 'ERROR', 'STALE')

@@ -55,12 +55,11 @@ class Turn:
 
 
 class KeyboardHandle:
-    """A handle one of whose angles runs at a constant speed while a key is held.
+    """A handle one of whose angles runs at a constant speed while a key is held."""
 
-    A held key is the dead-man: the handle runs from the first repeat of a key until `REPEAT_NS`
-    after the last one, or until any other key is pressed. Then the key has to be released and
-    pressed again.
-    """
+    # A held key is the dead-man: the handle runs from the first repeat of a key until `REPEAT_NS`
+    # after the last one, or until any other key is pressed. Then the key has to be released and
+    # pressed again.
 
     def __init__(self, joints: int, speed: float) -> None:
         self.dead_man = DeadMan()  # holds the clutch, and says why it does not
@@ -85,12 +84,10 @@ class KeyboardHandle:
         wanted: Sequence[float] | None = None,
         scale: float = 1.0,
     ) -> Turn:
-        """Take the keys typed since the last turn, and return the handle's state.
-
-        `hindrance` is what forbids motion, empty for nothing; `wanted` (J,) what the master asks
-        of the slave now, in rad, None while it follows nobody: the handle does not move before it
-        does, nor away from what it has reached; `scale` the slave's motion for one radian.
-        """
+        """Take the keys typed since the last turn, and return the handle's state."""
+        # `hindrance` is what forbids motion, empty for nothing; `wanted` (J,) what the master asks
+        # of the slave now, in rad, None while it follows nobody: the handle does not move before it
+        # does, nor away from what it has reached; `scale` the slave's motion for one radian.
         requests = [r for key in keys if (r := self._take(now_ns, key)) is not None]
         held = self.dead_man.turn(now_ns, hindrance)
         if not held:

@@ -24,10 +24,9 @@ _LOCAL, _INPUT, _CONTROL_CHARACTERS = 3, 0, 6
 
 
 class TerminalKeys:
-    """Reads names of keys out of the bytes of a terminal, however they are cut.
+    """Reads names of keys out of the bytes of a terminal, however they are cut."""
 
-    A name is the character in lower case, ``up``, ``down``, ``left``, ``right``, or ``other``.
-    """
+    # A name is the character in lower case, ``up``, ``down``, ``left``, ``right``, or ``other``.
 
     def __init__(self) -> None:
         self._text = codecs.getincrementaldecoder('utf-8')('replace')

@@ -183,10 +183,8 @@ class Comparison:
         return any(w.misfit <= allowed for w in followed if w.reading.kind in ('right', 'sign'))
 
     def _beyond_reach(self, drive: Misreading) -> float:
-        """What speaks against a command that turns shafts further than the rig lets them.
-
-        Of bending nothing is learnt: it follows any command at some scale.
-        """
+        """What speaks against a command that turns shafts further than the rig lets them."""
+        # Of bending nothing is learnt: it follows any command at some scale.
         turned = np.abs(self._held[:, list(drive.source)] / np.asarray(drive.factor)).max(axis=0)
         columns = int((turned > self._rig.motors.reach).sum())
         return columns * WORTH * log(MOST / USUAL['shaft_position'])

@@ -6,13 +6,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.effect import Effect, Stage
 from endoscope_core.physics.effects import describe
-from endoscope_core.physics.layout import NOMINAL_KEYS
 from endoscope_explain.decide.decision import Decision, MissingTerm
 from endoscope_explain.explanation import (
     ChannelFit,
@@ -24,21 +22,16 @@ from endoscope_explain.explanation import (
     Verdict,
 )
 from endoscope_explain.fit.evidence import held_out_fit
-from endoscope_explain.fit.free_parameters import (
-    FITTED_NOMINAL,
-    FRICTION_PROFILE_NAMES,
-    nominal_number,
-)
+from endoscope_explain.fit.free_parameters import FITTED_NOMINAL, nominal_number
 from endoscope_explain.fit.intervals import effect_estimates, nominal_estimates
 from endoscope_explain.fit.model import Fit, joint_of
 from endoscope_explain.fit.solver import Ended
 from endoscope_explain.observe.observation import JointObservation
+from endoscope_explain.recording import Array
 from endoscope_explain.search.formula import fitted_function, nearest_formula
 from endoscope_explain.search.levels import JointSearch
 from endoscope_explain.search.refit import Candidate
 from endoscope_explain.search.term import Term
-
-Array = NDArray[np.float64]
 
 CHANGED = 0.04
 """Relative difference of a nominal parameter that is worth a verdict."""
@@ -48,9 +41,6 @@ many that did not change, each with its own, one would mostly seem to differ."""
 MOST = 0.5
 """Share of the misfit that names must explain where they leave more than another form would: with
 less, the main thing has no name."""
-NOMINAL_UNITS = {
-    name: nominal_number(name).unit or '-' for name in (*NOMINAL_KEYS, *FRICTION_PROFILE_NAMES)
-}
 
 
 def named(
@@ -77,7 +67,6 @@ def named(
 
 
 def _named(joint: str, decision: Decision, term: MissingTerm) -> NamedEffect:
-    definition = describe(term.name)
     # Of physics that was given, no other name was tried.
     measured = math.isfinite(term.p_value)
     modelled = term.name in decision.chosen.effects
@@ -86,13 +75,7 @@ def _named(joint: str, decision: Decision, term: MissingTerm) -> NamedEffect:
     return NamedEffect(
         term.name,
         joint,
-        {}
-        if fitted is None
-        else effect_estimates(
-            fitted.fit,
-            definition.first_parameter,
-            {p.name: p.unit for p in definition.parameters},
-        ),
+        {} if fitted is None else effect_estimates(fitted.fit, describe(term.name)),
         tried.alternatives(term.name),
         {
             'gain': term.gain,
@@ -147,9 +130,7 @@ def numbers_differ(decisions: list[Decision]) -> bool:
     return any(
         has_changed(name, e)
         for d in decisions
-        for name, e in nominal_estimates(
-            d.chosen.fit, d.chosen.fit.model.base, NOMINAL_UNITS
-        ).items()
+        for name, e in nominal_estimates(d.chosen.fit, d.chosen.fit.model.base).items()
     )
 
 
@@ -196,8 +177,7 @@ def plant_of(plant: PlantDescription, fits: list[Candidate]) -> PlantDescription
 
 def _width(found: Fit, effect: Effect) -> float:
     """Width of the interval of an effect's first number."""
-    first = effect.parameters[0]
-    estimate = effect_estimates(found, effect.first_parameter, {first.name: first.unit})[first.name]
+    estimate = effect_estimates(found, effect)[effect.parameters[0].name]
     return estimate.high - estimate.low
 
 
@@ -296,16 +276,15 @@ def candidates(
     observations: tuple[JointObservation, ...], searches: list[JointSearch]
 ) -> tuple[Tried, ...]:
     """All candidates that were tried, the best first."""
-    found = []
-    for observation, tried in zip(observations, searches, strict=True):
-        for c in tried.tried():
-            found.append(
-                Tried(
-                    observation.joint,
-                    tuple(term.id for term in c.terms),
-                    tried.nominal.evidence - c.evidence,
-                    float(np.mean(c.fit.residuals**2)),
-                    not c.terms and c is not tried.nominal,
-                )
-            )
+    found = [
+        Tried(
+            observation.joint,
+            tuple(term.id for term in c.terms),
+            tried.nominal.evidence - c.evidence,
+            float(np.mean(c.fit.residuals**2)),
+            not c.terms and c is not tried.nominal,
+        )
+        for observation, tried in zip(observations, searches, strict=True)
+        for c in tried.tried()
+    ]
     return tuple(sorted(found, key=lambda c: c.score))

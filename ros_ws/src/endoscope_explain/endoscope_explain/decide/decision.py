@@ -1,17 +1,25 @@
-"""From what was tried on one joint to what is concluded of it."""
+"""From what was tried on one joint, or was chosen elsewhere, to what is concluded of it."""
 
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from itertools import takewhile
 
 import numpy as np
 from scipy.stats import chi2
 
 from endoscope_core.physics.effects import CATALOGUE, KNOWN
+from endoscope_core.workers import parallel_map
 from endoscope_explain.criteria import BEYOND_FORM
+from endoscope_explain.fit.evidence import log_evidence
+from endoscope_explain.fit.family import Family
+from endoscope_explain.fit.free_parameters import FreeParameter
 from endoscope_explain.fit.intervals import may_be_absent, with_form
+from endoscope_explain.fit.model import TO_THE_END, Fit, JointModel, fit, without_effect
 from endoscope_explain.prediction_set import OTHER_NUMBERS, Contest
-from endoscope_explain.search.levels import JointSearch, Level
-from endoscope_explain.search.refit import Candidate
+from endoscope_explain.recording import Array, Mask
+from endoscope_explain.search.levels import JointSearch, Level, search
+from endoscope_explain.search.refit import SETTLED, Candidate, candidate
 from endoscope_explain.search.term import Term
 
 SAME = 0.95
@@ -65,12 +73,12 @@ def _is_adequate(one: Candidate) -> bool:
     return (one.fit.beyond_form or 0.0) <= BEYOND_FORM
 
 
-def decide(search: JointSearch, jobs: int) -> Decision:
+def decide(tried: JointSearch, jobs: int) -> Decision:
     """Choose a candidate, name its terms and their rivals, and judge whether it is adequate."""
-    chosen: Candidate = search.nominal
+    chosen: Candidate = tried.nominal
     missing: tuple[MissingTerm, ...] = ()
     left: Contest | None = None
-    for level in search.levels:
+    for level in tried.levels:
         left = _contest(level, chosen.terms)
         if not level.is_found:
             break
@@ -92,22 +100,22 @@ def decide(search: JointSearch, jobs: int) -> Decision:
         form = unnamed and _is_adequate(_with_form(before, jobs))
         left = left if form else None
         missing = (*missing[: len(best.terms) - 1], replace(term, repairs_form=form))
-    missing = _named_as_chosen(search, chosen, missing, jobs)
+    missing = _named_as_chosen(tried, chosen, missing, jobs)
     repairs = tuple(term.term.id for term in missing if term.repairs_form)
     missing = tuple(term for term in missing if not term.repairs_form)
     chosen = _with_form(chosen, jobs)
-    explained = share_explained(search.nominal, chosen)
+    explained = share_explained(tried.nominal, chosen)
     left = left and left.without(term.name for term in missing)
     return Decision(chosen, missing, explained, left, repairs)
 
 
-def found_together(search: JointSearch, jobs: int) -> tuple[MissingTerm, ...]:
+def found_together(tried: JointSearch, jobs: int) -> tuple[MissingTerm, ...]:
     """The effects that several recordings of a rig lack, each with the rivals that all leave."""
     missing: tuple[MissingTerm, ...] = ()
-    for level in takewhile(lambda each: each.is_found, search.levels):
+    for level in takewhile(lambda each: each.is_found, tried.levels):
         if not level.adds_nothing(level.best):
             missing = (*missing[: len(level.best.terms) - 1], _missing(level, level.best, jobs))
-    return _named_as_chosen(search, search.found, missing, jobs)
+    return _named_as_chosen(tried, tried.found, missing, jobs)
 
 
 def _with_form(one: Candidate, jobs: int) -> Candidate:
@@ -157,11 +165,11 @@ def _name(level: Level, one: Candidate) -> str:
 
 
 def _named_as_chosen(
-    search: JointSearch, chosen: Candidate, missing: tuple[MissingTerm, ...], jobs: int
+    tried: JointSearch, chosen: Candidate, missing: tuple[MissingTerm, ...], jobs: int
 ) -> tuple[MissingTerm, ...]:
     """The missing terms as chosen: a rival of the first one may have led to a better two."""
     named = []
-    adding = [each for each in search.levels if each.found and not each.adds_nothing(each.best)]
+    adding = [each for each in tried.levels if each.found and not each.adds_nothing(each.best)]
     for position, term in enumerate(chosen.terms):
         if term.multiplies:
             continue
@@ -184,10 +192,8 @@ def _named_as_chosen(
 def _contest(
     level: Level, terms: tuple[Term, ...], first: tuple[str, Candidate] | None = None
 ) -> Contest:
-    """What was tried at a level beside some terms.
-
-    `first` is the name that was chosen, with the candidate that has it; None where none was.
-    """
+    """What was tried at a level beside some terms."""
+    # `first` is the name that was chosen, with the candidate that has it; None where none was.
     beside = level.beside(terms)
     tried: dict[str, Candidate] = {}
     formulas = {more.id for more, _ in beside}
@@ -229,3 +235,102 @@ def are_one(one: Candidate, other: Candidate, parent: Candidate) -> bool:
 
 def _numbers(one: Candidate) -> int:
     return sum(len(each.theta) for each in one.fits)
+
+
+@dataclass(frozen=True)
+class Rivalry:
+    """What was tried in a term's place where it was chosen."""
+
+    # As in `MissingTerm`.
+    name: str
+    contest: Contest
+    margin: float
+
+
+@dataclass(frozen=True)
+class GivenPhysics:
+    """A fitted joint without its recording."""
+
+    terms: tuple[Term, ...]  # in the order in which they were added
+    base: Array  # (parameters,)
+    flags: Mask  # (flags,)
+    free: tuple[FreeParameter, ...]  # as in `JointModel`
+    theta: Array  # (n,)
+    families: tuple[Family, ...] = ()  # as in `JointModel`
+    # By id of the term; none where it was not chosen by a search.
+    rivalries: Mapping[str, Rivalry] = field(default_factory=dict)
+
+
+GivenJoints = Mapping[str, GivenPhysics]
+"""By joint."""
+
+
+def without_recording(
+    terms: tuple[Term, ...], found: Fit, rivalries: Mapping[str, Rivalry] | None = None
+) -> GivenPhysics:
+    """The physics of a fit."""
+    model = found.model
+    return GivenPhysics(
+        terms,
+        model.base,
+        model.flags,
+        model.free,
+        found.theta,
+        model.families,
+        dict(rivalries or {}),
+    )
+
+
+def explained_by(
+    references: tuple[Fit, Fit], given: GivenPhysics, jobs: int
+) -> tuple[JointSearch, Decision]:
+    """Fit given physics to a joint, and see what each of its terms is needed for."""
+    # Each term gains what the joint loses without it. One term more is searched only where they
+    # leave more than another form would. The reference fits are the nominal plant refitted, and as
+    # described.
+    nominal = candidate((), references[0])
+    found = references[0]
+    missing: tuple[MissingTerm, ...] = ()
+    if given.terms:
+        model = JointModel(
+            references[0].model.observation,
+            given.base,
+            given.flags,
+            given.free,
+            families=given.families,
+        )
+        found = fit(model, given.theta, iterations=TO_THE_END, tolerance=SETTLED)
+        missing = _needed(candidate(given.terms, found), given, jobs)
+    beside = decide(JointSearch(candidate((), found), ()), jobs)
+    tried: tuple[Level, ...] = ()
+    if not beside.adequate:
+        tried = search([(found,)], jobs, 1).levels
+        beside = decide(JointSearch(candidate((), found), tried), jobs)
+    chosen = candidate((*given.terms, *beside.chosen.terms), beside.chosen.fit)
+    everything = (*missing, *beside.missing)
+    return JointSearch(nominal, tried), Decision(
+        chosen, everything, share_explained(nominal, chosen)
+    )
+
+
+def _needed(whole: Candidate, given: GivenPhysics, jobs: int) -> tuple[MissingTerm, ...]:
+    """Each given term with what the joint loses without it, and its rivals where it has any."""
+    lesser = [without_effect(whole.fit, term.id) for term in whole.terms]
+    fits = parallel_map(lambda less: fit(*less), lesser, jobs)
+    found = []
+    for term, less in zip(whole.terms, fits, strict=True):
+        gain = whole.evidence - log_evidence(less)
+        alone = Rivalry(term.id, Contest(((term.id,),), (gain,), 0.0, found=True), 0.0)
+        rivalry = given.rivalries.get(term.id, alone)
+        found.append(
+            MissingTerm(
+                term,
+                rivalry.name,
+                rivalry.contest,
+                gain,
+                rivalry.margin,
+                math.nan,
+                None if term.is_function else whole,
+            )
+        )
+    return tuple(found)

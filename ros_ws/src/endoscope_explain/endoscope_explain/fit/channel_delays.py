@@ -9,7 +9,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from endoscope_bags.dataset_card import ChannelDelay
@@ -27,12 +26,11 @@ from endoscope_explain.recording import (
     MOTOR,
     MOVES_RAD,
     WIRES,
+    Array,
     RigRecording,
     motor_name,
     wire_names,
 )
-
-Array = NDArray[np.float64]
 
 DELAY = 'delay_s'
 
@@ -56,18 +54,8 @@ CHI_SQUARED_90 = 2.706
 def channel_delays(
     recording: RigRecording, plant: PlantDescription, jobs: int = 2
 ) -> tuple[ChannelDelay, ...]:
-    """Return the delay of every measured channel, or why it is unknown.
-
-    Parameters
-    ----------
-    recording : RigRecording
-        As audited.
-    plant : PlantDescription
-        With the joints of the recording; its effects are in force, and delays among them are where
-        the fit begins.
-    jobs : int
-        Parallel tasks.
-    """
+    """The delay of every measured channel of an audited recording, or why it is unknown."""
+    # The plant's effects are in force, and delays among them are where the fit begins.
     shafts = _shafts(recording)
     moved = np.ptp(recording.command.values, axis=0)
     why = {
@@ -103,10 +91,10 @@ def _of_joint(refitted: Fit, quantities: Sequence[str], jobs: int) -> list[Chann
     # More than noise is left, and more than another form leaves, or numbers at an end of theirs.
     if late.beyond_form and (late.beyond_form > 1.0 or is_at_tolerance(late)):
         return _unknown(joint, quantities, 'the plant does not explain this recording')
-    numbers, result = intervals(late), []
+    numbers, result = {each.index: each for each in intervals(late)}, []
     for quantity in quantities:
-        at = numbers.indices.index(EFFECTS[quantity].first_parameter)
-        value, low, high = (float(v[at]) for v in (numbers.values, numbers.low, numbers.high))
+        late_by = numbers[EFFECTS[quantity].first_parameter]
+        value, low, high = late_by.value, late_by.low, late_by.high
         if high >= LONGEST_S:
             result += _unknown(joint, [quantity], f'not limited to less than {LONGEST_S:g} s')
         else:
@@ -138,11 +126,10 @@ def _unknown(joint: str, quantities: Iterable[str], why: str) -> list[ChannelDel
 def _shafts(recording: RigRecording) -> list[ChannelDelay | None]:
     """Delay of each joint's shaft; None where it was not recorded."""
     shaft, command = recording.shaft_position, recording.command
+    if shaft is None:
+        return [None for _ in recording.joints]
     found: list[ChannelDelay | None] = []
     for j, joint in enumerate(recording.joints):
-        if shaft is None:
-            found.append(None)
-            continue
         valid = shaft.valid[:, j]
         shift = shift_after(
             command.time, command.values[:, j], shaft.time[valid], shaft.values[valid, j]
@@ -158,10 +145,8 @@ def _shafts(recording: RigRecording) -> list[ChannelDelay | None]:
 def shift_after(
     command_time: Array, command: Array, time: Array, value: Array
 ) -> tuple[float, float, float] | None:
-    """Shift in s at which values (N,) follow a held command (M,) best, with its 90 % interval.
-
-    None where shifts apart from each other do so equally well, as in the middle of a sine.
-    """
+    """Shift in s at which values (N,) follow a held command (M,) best, with its 90 % interval."""
+    # None where shifts apart from each other do so equally well, as in the middle of a sine.
     shifts = np.arange(0.0, LONGEST_S + STEP_S, STEP_S)
     judged = time >= command_time[0] + LONGEST_S
     time, value = time[judged], value[judged]

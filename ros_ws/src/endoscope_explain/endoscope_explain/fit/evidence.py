@@ -8,15 +8,13 @@ for what it could have explained and did not; no penalty is set by hand.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t
 
 from endoscope_explain.explanation import ChannelFit
 from endoscope_explain.fit.model import Fit, fit
 from endoscope_explain.observe.observation import WHITE, JointObservation
 from endoscope_explain.observe.revisits import held_out
-
-Array = NDArray[np.float64]
+from endoscope_explain.recording import Array
 
 
 def mean_squares(observation: JointObservation, residuals: Array) -> Array:

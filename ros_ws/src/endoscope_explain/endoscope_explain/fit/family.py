@@ -8,7 +8,6 @@ normal prior each: the evidence itself then pays for a flexible function.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from endoscope_core.physics.functions.places import NODES, RELAXING, Place, Shape
@@ -24,8 +23,7 @@ from endoscope_core.physics.layout import (
     PULLEY_RADIUS,
 )
 from endoscope_explain.observe.observation import JointObservation
-
-Array = NDArray[np.float64]
+from endoscope_explain.recording import Array
 
 COEFFICIENTS = 7
 LENGTH = 0.25

@@ -3,9 +3,6 @@
 import math
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from endoscope_core.physics.description import NUMBERS, PlantNumber
 from endoscope_core.physics.effect import Parameter
 from endoscope_core.physics.effects import describe, lacking
@@ -13,6 +10,7 @@ from endoscope_core.physics.functions.places import HIGH, LAG, Place
 from endoscope_core.physics.layout import FRICTION_PROFILE, NOMINAL_KEYS
 from endoscope_explain.explanation import NINETY_PERCENT
 from endoscope_explain.options import BAND
+from endoscope_explain.recording import Array
 
 LEAD = -1
 """Index that stands for the reading's lead, which is not a parameter of the plant."""
@@ -51,9 +49,6 @@ def tolerance(name: str, described: float, band: float = BAND) -> tuple[float, f
         reach = NINETY_PERCENT * spread
         return described - reach, described + reach
     return described / (1.0 + band), described * (1.0 + band)
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

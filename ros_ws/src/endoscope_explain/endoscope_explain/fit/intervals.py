@@ -8,14 +8,13 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2, t
 
 from endoscope_core.physics.description import NUMBERS
 from endoscope_core.physics.effect import Effect
 from endoscope_core.physics.effects import lacking
 from endoscope_core.physics.functions.places import NODES, VALUES
-from endoscope_core.physics.layout import FRICTION_PROFILE, PROFILE_TERMS
+from endoscope_core.physics.layout import FRICTION_PROFILE, NOMINAL_KEYS, PROFILE_TERMS
 from endoscope_core.workers import parallel_map
 from endoscope_explain.criteria import INTERVAL_WIDTH
 from endoscope_explain.explanation import NINETY_PERCENT, Estimate, NominalEstimate
@@ -24,10 +23,12 @@ from endoscope_explain.fit.free_parameters import (
     COEFFICIENT,
     FITTED_NOMINAL,
     FRICTION_PROFILE_NAMES,
+    nominal_number,
     tolerance,
 )
 from endoscope_explain.fit.model import Fit, broyden_fit
 from endoscope_explain.observe.observation import JointObservation
+from endoscope_explain.recording import Array
 
 # A fit's misfit is mostly an error of form, not noise: friction along a real sheath has a finer
 # profile than the few terms that are fitted, and a law has finer details than the function that
@@ -36,7 +37,6 @@ from endoscope_explain.observe.observation import JointObservation
 # much it moves the numbers, is what form alone does (a parametric bootstrap over forms: Efron,
 # Tibshirani, An Introduction to the Bootstrap, 1993, ch. 21).
 
-Array = NDArray[np.float64]
 
 STEPS = 8
 """Simulations in which the model is fitted to a rig of another form, whose numbers are its own."""
@@ -113,17 +113,16 @@ TOGETHER = math.sqrt(0.75)
 
 
 @dataclass(frozen=True)
-class Intervals:
-    """90 % intervals of a fit's free parameters."""
+class Interval:
+    """90 % interval of a free parameter of a fit."""
 
-    names: tuple[str, ...]
-    indices: tuple[int, ...]  # places in the packed parameters
-    values: Array  # (n,)
-    low: Array  # (n,)
-    high: Array  # (n,)
-    shown: NDArray[np.bool_]  # (n,), whether the recording shows more of it than the prior
-    # Number without which the recording does not show this one; empty where it does.
-    partners: tuple[str, ...]
+    name: str
+    index: int  # place in the packed parameters
+    value: float
+    low: float
+    high: float
+    shown: bool  # whether the recording shows more of it than the prior
+    partner: str  # number without which the recording does not show this one; empty where it does
 
 
 def covariance(fit: Fit) -> Array:
@@ -142,7 +141,7 @@ def _with_form(spread: Array, fit: Fit) -> Array:
     return np.asarray(spread + scale**2 * fit.moved_by_form)
 
 
-def intervals(fit: Fit) -> Intervals:
+def intervals(fit: Fit) -> list[Interval]:
     """90 % intervals of a fit, within the parameters' bounds."""
     kept = [k for k, item in enumerate(fit.model.free) if item.index != COEFFICIENT]
     free = [fit.model.free[k] for k in kept]
@@ -159,19 +158,19 @@ def intervals(fit: Fit) -> Intervals:
     nearest = np.where(bound, correlation, 0.0).argmax(axis=1)
     partners = (free[n].name if bound[k, n] else '' for k, n in enumerate(nearest))
     reach *= INTERVAL_WIDTH
-
-    def values(coordinates: Array) -> Array:
-        return np.array([item.value(c) for item, c in zip(free, coordinates, strict=True)])
-
-    return Intervals(
-        tuple(item.name for item in free),
-        tuple(item.index for item in free),
-        values(theta),
-        values(theta - reach),
-        values(theta + reach),
-        shown,
-        tuple(partners),
-    )
+    numbers = zip(free, theta.tolist(), reach.tolist(), shown.tolist(), partners, strict=True)
+    return [
+        Interval(
+            item.name,
+            item.index,
+            float(item.value(at)),
+            float(item.value(at - by)),
+            float(item.value(at + by)),
+            seen,
+            partner,
+        )
+        for item, at, by, seen, partner in numbers
+    ]
 
 
 def may_be_absent(fit: Fit, effect: Effect) -> bool:
@@ -193,56 +192,41 @@ def may_be_absent(fit: Fit, effect: Effect) -> bool:
     return squared <= chi2.ppf(0.9, len(strengths))
 
 
-def nominal_estimates(
-    fit: Fit, described: Array, units: dict[str, str]
-) -> dict[str, NominalEstimate]:
+NOMINAL_UNITS = {
+    name: nominal_number(name).unit or '-' for name in (*NOMINAL_KEYS, *FRICTION_PROFILE_NAMES)
+}
+
+
+def nominal_estimates(fit: Fit, described: Array) -> dict[str, NominalEstimate]:
     """Estimates of the nominal parameters of a fit, beside those described (parameters,)."""
-    found, ends = intervals(fit), fit.at_bounds()
+    ends, estimates = fit.at_bounds(), {}
     absent = {place for each in lacking(described) for place in each.places}
-    return {
-        name: NominalEstimate(
-            float(value),
-            float(low),
-            float(high),
-            units.get(name, ''),
-            float(described[index]),
-            _in_band(name, float(value), float(described[index])),
-            bool(shown),
-            partner,
-            name in ends,
-        )
-        for name, index, value, low, high, shown, partner in zip(
-            found.names,
-            found.indices,
-            found.values,
-            found.low,
-            found.high,
-            found.shown,
-            found.partners,
-            strict=True,
-        )
-        if name in FITTED_NOMINAL and index not in absent
-    }
+    for each in intervals(fit):
+        if each.name in FITTED_NOMINAL and each.index not in absent:
+            nominal = float(described[each.index])
+            low, high = tolerance(each.name, nominal)
+            estimates[each.name] = NominalEstimate(
+                each.value,
+                each.low,
+                each.high,
+                NOMINAL_UNITS[each.name],
+                nominal,
+                low <= each.value <= high,
+                each.shown,
+                each.partner,
+                each.name in ends,
+            )
+    return estimates
 
 
-def _in_band(name: str, value: float, described: float) -> bool:
-    low, high = tolerance(name, described)
-    return low <= value <= high
-
-
-def effect_estimates(fit: Fit, first: int, units: dict[str, str]) -> dict[str, Estimate]:
-    """Estimates of one effect's parameters: those named in `units`, from packed index `first`."""
-    found = intervals(fit)
+def effect_estimates(fit: Fit, effect: Effect) -> dict[str, Estimate]:
+    """Estimates of one effect's parameters, by their names."""
+    found = {each.index: each for each in intervals(fit)}
     packed, _ = fit.model.packed(fit.theta)
     estimates = {}
-    for offset, (name, unit) in enumerate(units.items()):
-        index = first + offset
-        if index in found.indices:
-            i = found.indices.index(index)
-            estimates[name] = Estimate(
-                float(found.values[i]), float(found.low[i]), float(found.high[i]), unit
-            )
-        else:
-            value = float(packed[index])
-            estimates[name] = Estimate(value, value, value, unit)
+    for index, parameter in zip(effect.places, effect.parameters, strict=True):
+        value = low = high = float(packed[index])
+        if (each := found.get(index)) is not None:
+            value, low, high = each.value, each.low, each.high
+        estimates[parameter.name] = Estimate(value, low, high, parameter.unit)
     return estimates

@@ -16,26 +16,16 @@ from endoscope_core.physics.packing import pack
 from endoscope_core.physics.simulator import TICK
 from endoscope_explain.fit.family import Family
 from endoscope_explain.fit.free_parameters import COEFFICIENT, COORDINATE, LEAD, FreeParameter
-from endoscope_explain.fit.solver import (
-    STEP,
-    Effort,
-    Ended,
-    Minimum,
-    Renewal,
-    Secants,
-    minimise,
-)
+from endoscope_explain.fit.solver import STEP, Effort, Ended, Minimum, Renewal, Secants, minimise
 from endoscope_explain.observe.observation import JointObservation
-from endoscope_explain.observe.simulated import simulate_joints
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from endoscope_explain.observe.predicted_signals import simulate_joints
+from endoscope_explain.recording import Array, Mask
 
 
 def simulate_joint(
     observation: JointObservation,
     parameters: Array,
-    flags: Flags,
+    flags: Mask,
     inputs: Array | None = None,
 ) -> Array:
     """Noise-free readings (N, OUTPUTS) of one joint under the recorded, or other, inputs."""
@@ -59,7 +49,7 @@ def residuals(
     )
 
 
-def packed_joint(plant: PlantDescription, joint: str) -> tuple[Array, Flags]:
+def packed_joint(plant: PlantDescription, joint: str) -> tuple[Array, Mask]:
     """Parameters (parameters,) and flags (flags,) of one joint of a plant."""
     parameters, flags = pack(plant)
     index = plant.joint_names().index(joint)
@@ -92,7 +82,7 @@ class JointModel:
 
     observation: JointObservation
     base: Array  # (parameters,), packed parameters; the free ones are replaced
-    flags: Flags  # (flags,)
+    flags: Mask  # (flags,)
     free: tuple[FreeParameter, ...]
     # Difference step of a coordinate where an effect makes the misfit rugged.
     wide_step: float = WIDE_STEP

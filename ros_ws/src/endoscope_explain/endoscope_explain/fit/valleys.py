@@ -8,12 +8,10 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.fit.model import Fit, fit
-
-Array = NDArray[np.float64]
+from endoscope_explain.recording import Array
 
 ONSET = 'time_s'
 """Name of the parameters of when something begins."""

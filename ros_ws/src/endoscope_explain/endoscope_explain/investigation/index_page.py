@@ -18,7 +18,7 @@ from endoscope_explain.investigation.log import (
     times,
     tracking,
 )
-from endoscope_explain.investigation.tracking import FILE, tracked
+from endoscope_explain.investigation.motions import FILE, tracked
 from endoscope_pages import Curve, Plot, figure_html, html_table, render_page
 
 COLOURS = ('actual', 'wanted')

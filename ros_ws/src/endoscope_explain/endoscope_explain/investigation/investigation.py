@@ -20,16 +20,18 @@ from endoscope_explain.explanation import NamedEffect, Verdict
 from endoscope_explain.investigation import log as logs
 from endoscope_explain.investigation.log import Log, Name, RigAnswer, Round, Stop
 from endoscope_explain.investigation.motions import (
+    PlayThrough,
     RigMotion,
     commissioning,
+    held_out,
     of_experiment,
     require_allowed,
+    with_tracking,
 )
-from endoscope_explain.investigation.tracking import PlayThrough, held_out, with_tracking
 from endoscope_explain.open_questions import open_questions
 from endoscope_explain.operator_changes import what_would_decide
 from endoscope_explain.pipeline import Progress, explain_case, read_inputs
-from endoscope_explain.prediction_set import OTHER_NUMBERS, Posterior
+from endoscope_explain.prediction_set import OTHER_NUMBERS
 from endoscope_explain.report.left_open import in_words
 from endoscope_explain.report.numbers import shown
 from endoscope_explain.report.sentences import verdict_sentence, where
@@ -84,14 +86,10 @@ def investigate(
     page: Page | None = None,
     report: Callable[[str], None] = lambda _: None,
 ) -> Log:
-    """Ask a rig for motions until it is explained; continue where a folder's log has ended.
-
-    With `track` a motion that is among no experiments then shows what the improved plant is good
-    for.
-
-    What is known is in the folder after every step. Interruption and a fault of the rig end it with
-    that, and so do Ctrl-C and any other error, which are raised again afterwards.
-    """
+    """Ask a rig for motions until it is explained; continue where a folder's log has ended."""
+    # With `track` a motion that is among no experiments then shows what the improved plant is good
+    # for. What is known is in the folder after every step. Interruption and a fault of the rig end
+    # it with that; Ctrl-C and any other error are raised again afterwards.
     running = _Running(
         investigation, logs.begun(investigation.folder, investigation.plant_file), page, report
     )
@@ -168,7 +166,7 @@ class _Running:
         self.keep(self.log.with_whole(answer=found))
         for line in logs.answered(found):
             self.report(line)
-        if not _asks_more(case):
+        if not (open_questions(case) or any(map(is_wide, case.effects))):
             return Stop.ONE_CLASS
         if len(whole) > self.of.experiments:
             return Stop.USED_UP
@@ -216,7 +214,7 @@ class _Running:
         log = self.log
         if log.rounds and not log.rounds[-1].recorded and stop in logs.CUT_SHORT:
             log = log.with_last(ended=sentence)
-        self.keep(log.ended(stop, sentence))
+        self.keep(replace(log, stopped=stop, words=sentence))
         self.report(sentence)
         for line in logs.times(self.log):
             self.report(line)
@@ -224,38 +222,27 @@ class _Running:
 
 def answer_of(case: ExplainedCase, seconds: float) -> RigAnswer:
     """What all recordings show together."""
-    fit = case.explanation.fit
+    explanation = case.explanation
+    fit = explanation.fit
     worst = [
         max((each.ratio for each in fit[name].values()), default=None) if name in fit else None
         for name in ('nominal', 'augmented')
     ]
     names = [
-        Name(e.id, e.joint, e.alternatives, _strength(e), is_wide(e), _open(e.left_open))
+        Name(e.id, e.joint, e.alternatives, _strength(e), is_wide(e), in_words(e.left_open))
         for e in case.effects
     ]
+    # What may be missing where no more than other numbers is found to be.
     names += [
-        Name(OTHER_NUMBERS, joint, rivals, '', left_open=_open(case.explanation.left_open(joint)))
-        for joint, rivals in _beside_numbers(case).items()
+        Name(OTHER_NUMBERS, joint, rivals, '', left_open=in_words(explanation.left_open(joint)))
+        for joint in explanation.contests
+        if (rivals := explanation.instead(joint))
     ]
     sentence = verdict_sentence(case)
     places = tuple(where(place) for place in case.places)
     return RigAnswer(str(case.verdict), sentence, tuple(names), worst[0], worst[1], seconds, places)
 
 
-def _open(left: Posterior) -> str:
-    return in_words(left) if left else ''
-
-
 def _strength(effect: NamedEffect) -> str:
     first = effect.definition.parameters[0].name
     return str(shown(first, effect.parameters[first])) if first in effect.parameters else ''
-
-
-def _beside_numbers(case: ExplainedCase) -> dict[str, tuple[str, ...]]:
-    """By joint, what may be missing where no more than other numbers is found to be."""
-    open_ones = {joint: case.explanation.instead(joint) for joint in case.explanation.contests}
-    return {joint: names for joint, names in open_ones.items() if names}
-
-
-def _asks_more(case: ExplainedCase) -> bool:
-    return bool(open_questions(case)) or any(map(is_wide, case.effects))

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -98,17 +98,23 @@ class Tracking:
 
 
 @dataclass(frozen=True)
-class Log:
-    """An investigation from its beginning to now."""
+class _Kept:
+    """A log as its file has it, but for why it was stopped."""
 
     schema: int
     plant: str  # file of the described plant
     plant_sha256: str
     rounds: tuple[Round, ...] = ()
-    stopped: Stop | None = None
-    words: str = ''  # why, in a sentence
+    words: str = ''  # why it was stopped, in a sentence
     tracking: tuple[Tracking, ...] = ()  # by the described and by the improved plant
     untracked: str = ''  # why it was not measured
+
+
+@dataclass(frozen=True)
+class Log(_Kept):
+    """An investigation from its beginning to now."""
+
+    stopped: Stop | None = None
 
     @property
     def whole(self) -> tuple[Round, ...]:
@@ -142,10 +148,6 @@ class Log:
         rounds = (replace(r, **changed) if r is last else r for r in self.rounds)  # type: ignore[arg-type]
         return replace(self, rounds=tuple(rounds))
 
-    def ended(self, stop: Stop, words: str) -> 'Log':
-        """The log with why it ends."""
-        return replace(self, stopped=stop, words=words)
-
     def write(self, folder: Path) -> None:
         """Write it as data and in sentences."""
         text = json.dumps(asdict(self), indent=1, allow_nan=False)
@@ -154,11 +156,7 @@ class Log:
 
 
 def begun(folder: Path, plant: Path) -> Log:
-    """The log of a folder, to be continued, or that of a new one.
-
-    InputError if the folder holds something else, an investigation of another plant, or one that
-    has come to its end.
-    """
+    """The log of a folder, to be continued, or of a new one; InputError of any other folder."""
     digest = hashlib.sha256(plant.read_bytes()).hexdigest()
     file = folder / LOG
     if not file.exists():
@@ -187,30 +185,11 @@ def _read(file: Path) -> Log:
         content = json.loads(file.read_text('utf-8'))
     except (OSError, ValueError) as error:
         raise FileError(f'{file} cannot be read as a log: {error}') from error
-    if isinstance(content, Mapping) and content.get('stopped') is not None:
-        content = dict(content)
-        if content['stopped'] not in list(Stop):
-            raise FileError(f'{file}: stopped is {content["stopped"]!r}')
-        stopped = Stop(content.pop('stopped'))
-        return replace(read(_Kept, content, str(file)).log(), stopped=stopped)
-    return read(_Kept, content, str(file)).log()
-
-
-@dataclass(frozen=True)
-class _Kept:
-    """A log as its file has it."""
-
-    schema: int
-    plant: str
-    plant_sha256: str
-    rounds: tuple[Round, ...] = ()
-    stopped: None = None
-    words: str = ''
-    tracking: tuple[Tracking, ...] = ()
-    untracked: str = ''
-
-    def log(self) -> Log:
-        return Log(**vars(self))
+    stopped = content.pop('stopped', None) if isinstance(content, dict) else None
+    if stopped is not None and stopped not in list(Stop):
+        raise FileError(f'{file}: stopped is {stopped!r}')
+    kept = read(_Kept, content, str(file))
+    return Log(**vars(kept), stopped=None if stopped is None else Stop(stopped))
 
 
 def in_sentences(log: Log) -> list[str]:

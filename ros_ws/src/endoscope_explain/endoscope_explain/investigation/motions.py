@@ -1,29 +1,26 @@
-"""The motions of an investigation: within what a rig may do, or refused."""
+"""The motions of an investigation, within what a rig may do, and how well the tip follows one."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from endoscope_core.errors import InputError
+from endoscope_bags import open_bag
+from endoscope_core.errors import InputError, NotPlayedError
+from endoscope_core.metrics import tracking_rmse
 from endoscope_core.names import JOINTS
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.rig import Rig
-from endoscope_core.signals import Signal, hold, sequence
-from endoscope_core.signals.command_file import CommandTable
-from endoscope_core.signals.motions import (
-    again_with_hold,
-    chirp,
-    steps_with_holds,
-    there_and_back,
-)
+from endoscope_core.signals import Signal, hold, move, non_periodic_signal, sequence
+from endoscope_core.signals.command_file import CommandTable, read_command_file, write_command_file
+from endoscope_core.signals.motions import again_with_hold, chirp, steps_with_holds, there_and_back
 from endoscope_explain.case import NextExperiment
-from endoscope_explain.experiment_motions import SAMPLE_S, as_played
-from endoscope_explain.imagined_motion import answer_to, is_safe
-from endoscope_explain.investigation.log import COMMISSIONING, in_words
-
-Array = NDArray[np.float64]
+from endoscope_explain.experiment_motions import SAMPLE_S, answer_to, as_played, is_safe
+from endoscope_explain.investigation import log as logs
+from endoscope_explain.investigation.log import COMMISSIONING, Log, Tracking, in_words
+from endoscope_explain.recording import BENDING, DESIRED, Array
 
 SHARES = (1.0, 0.75, 0.5, 0.3)
 """Of the commissioning motion's size, the first that is safe."""
@@ -63,13 +60,12 @@ class RigMotion:
 
 
 def first_motion() -> dict[str, Signal]:
-    """Wide strokes, a chirp, the strokes again with a hold and a small loop, and steps, by joint.
-
-    28 s and a rest of 1 s, about half as long as `signals.commissioning_motion`, as what it leaves
-    open is asked for by the next one. Its strokes of 140 deg are 40 deg wider than the backlash of
-    the worst class, and come again in its second half, which is what is held out. `bend_y` begins
-    once `bend_x` has moved alone, so that whatever appears on it meanwhile is coupling.
-    """
+    """Wide strokes, a chirp, the strokes again with hold and small loop, and steps, by joint."""
+    # 28 s and a rest of 1 s, about half as long as `signals.commissioning_motion`, as what it
+    # leaves open is asked for by the next one. Its strokes of 140 deg are 40 deg wider than the
+    # backlash of the worst class, and come again in its second half, which is what is held out.
+    # `bend_y` begins once `bend_x` has moved alone, so that whatever appears on it meanwhile is
+    # coupling.
     # Rounded corners take 2 deg.
     reach = math.radians(72.0)
     speed = 1.1 * reach
@@ -83,10 +79,7 @@ def first_motion() -> dict[str, Signal]:
 
 
 def commissioning(plant: PlantDescription, rig: Rig) -> RigMotion:
-    """The commissioning motion as large as the rig's limits and the described plant allow.
-
-    MotionRefusedError if the described plant answers it beyond them at any size.
-    """
+    """The commissioning motion as large as is allowed; MotionRefusedError if it is at no size."""
     motion = first_motion()
     time = np.arange(0.0, max(signal.duration for signal in motion.values()), SAMPLE_S)
     whole = np.stack(
@@ -136,3 +129,87 @@ def require_allowed(motion: RigMotion, rig: Rig) -> None:
                 f'{motion.waveform} of {motion.joint} is refused: its largest {what} is '
                 f'{most:.3g} {unit}, and rig.yaml allows {limit:.3g}'
             )
+
+
+HELD_OUT = 'held-out motion'
+FILE = 'held_out.csv'
+DURATION_S = 15.0
+LEAD_S = 4.0
+"""Before errors count, the tip goes as far to either side as it will, so that play and friction are
+where the same way has led them, whatever was before and whichever plant is inverted."""
+TRACKED_SHARE = 0.5
+"""Of the largest angle of the commissioning motion: what compensation adds to it stays within what
+the rig has been through."""
+
+PlayThrough = Callable[[RigMotion, Path, Path, Path], None]
+"""Plays a motion, which a file holds, to a bag, through the inverse of the plant of another."""
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """A motion as it was asked for and as the tip made it."""
+
+    time: Array  # (N,), s since the motion began, which is led into for `LEAD_S`
+    desired: Array  # (N, J), rad
+    tip: Array  # (N, J), rad
+
+    @property
+    def rmse(self) -> float:
+        """In rad, over all joints."""
+        return tracking_rmse(self.desired, self.tip)
+
+
+def held_out(plant: PlantDescription, rig: Rig) -> RigMotion:
+    """A motion of both joints that is among no experiments."""
+    first = commissioning(plant, rig)
+    signal = non_periodic_signal(DURATION_S)
+    time = np.arange(0.0, LEAD_S + signal.duration, SAMPLE_S)
+    lead = time < LEAD_S
+    angle = np.asarray(signal(time[~lead] - LEAD_S)[0])
+    largest = TRACKED_SHARE * first.largest
+    angle *= largest / float(np.abs(angle).max())
+    parts = [move(0.0, 1.0, 1.0), move(1.0, -1.0, 2.0), move(-1.0, angle[0] / largest, 1.0)]
+    aside = sequence('to either side', parts)
+    angle = np.concatenate([largest * aside(time[lead])[0], angle])
+    columns = [angle if joint in plant.joints else 0.0 * angle for joint in JOINTS]
+    table = CommandTable(JOINTS, *as_played(time, np.stack(columns, axis=1), rig))
+    why = 'It is among no experiments: it shows what the improved plant is good for.'
+    return RigMotion(HELD_OUT, first.joint, why, table)
+
+
+def with_tracking(
+    log: Log, folder: Path, plant_file: Path, motion: RigMotion, rig: Rig, play: PlayThrough
+) -> Log:
+    """The log with how the tip follows by the described and by the improved plant, or why not."""
+    require_allowed(motion, rig)
+    write_command_file(folder / FILE, motion.table.time, motion.table.angle, JOINTS)
+    found: tuple[Tracking, ...] = ()
+    for by, file in (('described', plant_file), ('improved', folder / logs.PLANT)):
+        bag = f'tracking_{by}_{1 + sum(1 for _ in folder.glob(f"tracking_{by}_*"))}'
+        try:
+            play(motion, folder / FILE, folder / bag, file)
+        except NotPlayedError as error:
+            return replace(log, tracking=(), untracked=str(error))
+        rmse = math.degrees(tracked(folder / bag, folder / FILE).rmse)
+        found = (*found, Tracking(by, bag, rmse))
+    return replace(log, tracking=found, untracked='')
+
+
+def tracked(bag: Path, file: Path) -> Tracked:
+    """What a bag has of a motion that a file asks for, by the time of the file, once led into."""
+    opened, table = open_bag(bag), read_command_file(file)
+    stream, tip = (opened.joint_state(topic).select(JOINTS) for topic in (DESIRED, BENDING))
+    stamp_s = 1e-9 * (stream.stamp_ns - stream.stamp_ns[0])
+    columns = stream.require('position').T
+
+    def desired(time: Array) -> Array:
+        return np.stack([np.interp(time, stamp_s, column) for column in columns], axis=1)
+
+    # The way to the beginning of a motion takes as long as it takes.
+    spare = max(0.0, stamp_s[-1] - table.time[-1])
+    begins = np.arange(0.0, spare + SAMPLE_S, SAMPLE_S)
+    off = [tracking_rmse(table.angle, desired(table.time + begin)) for begin in begins]
+    begin = float(begins[np.argmin(off)])
+    since = 1e-9 * (tip.stamp_ns - stream.stamp_ns[0]) - begin
+    inside = (since >= LEAD_S) & (since <= stamp_s[-1] - begin)
+    return Tracked(since[inside], desired(since[inside] + begin), tip.require('position')[inside])

@@ -1,29 +1,32 @@
 """Where a mismatch is: stage, signals, time, state and frequency."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import periodogram, savgol_filter
 
 from endoscope_core.physics.description import PlantDescription
-from endoscope_core.physics.effects import describe
 from endoscope_core.physics.layout import IN_MOTOR
-from endoscope_core.physics.packing import without_functions
 from endoscope_core.physics.simulator import TICK
 from endoscope_explain.audit import Finding
 from endoscope_explain.case import ChainCut, Mismatch, changed_parameters
 from endoscope_explain.explanation import Explanation, NamedEffect
 from endoscope_explain.fit.free_parameters import nominal_number
 from endoscope_explain.fit.model import simulate_joint
-from endoscope_explain.locate.conditions import conditions, drive, regime_in_words
-from endoscope_explain.locate.excess import SignalExcess, excess_between, intervals, onset, shares
+from endoscope_explain.locate.excess import (
+    SignalExcess,
+    conditions,
+    drive,
+    excess_between,
+    intervals,
+    onset,
+    regime_in_words,
+    shares,
+)
 from endoscope_explain.observe.observation import JointObservation, observe
 from endoscope_explain.observe.predicted_signals import packed_rig, reading_lead, simulate_rig
-from endoscope_explain.recording import RigRecording
-
-Array = NDArray[np.float64]
+from endoscope_explain.open_questions import without
+from endoscope_explain.recording import Array, RigRecording
 
 SMOOTHED_S = 0.021
 """Window over which the encoder's steps are smoothed: shorter than the servo's answer."""
@@ -61,13 +64,12 @@ def _at_ends_of_ticks(time: Array, angle: Array, ticks: int) -> Array:
 
 
 def _misfit(observation: JointObservation, outputs: Array, lead: float) -> float:
-    total, count = 0.0, 0
-    for channel in observation.channels:
-        if channel.quantity in BEHIND:
-            wrong = (channel.predicted(outputs, lead) - channel.value) / channel.noise
-            total += float(wrong @ wrong)
-            count += len(wrong)
-    return float(np.sqrt(total / max(count, 1)))
+    wrong = [
+        (channel.predicted(outputs, lead) - channel.value) / channel.noise
+        for channel in observation.channels
+        if channel.quantity in BEHIND
+    ]
+    return float(np.sqrt(np.mean(np.concatenate(wrong) ** 2))) if wrong else 0.0
 
 
 def band_hz(excess: SignalExcess) -> tuple[float, float]:
@@ -96,7 +98,7 @@ def locate_effects(
     # the measurement then has in excess is that effect's trace.
     located = []
     for effect in effects:
-        rest = _without(plant, effect)
+        rest = without(plant, effect)
         if rest == plant:
             continue
         found = excess_between(recording, rest, plant)
@@ -104,14 +106,6 @@ def locate_effects(
         began = None if time is None else time.value
         located.append(place(recording, found, effect.stage, effect.joint, began))
     return located
-
-
-def _without(plant: PlantDescription, effect: NamedEffect) -> PlantDescription:
-    """The plant without an effect, or without the function by which the plant has it."""
-    here = effect.id, effect.joint
-    if any((e.id, e.joint) == here for e in plant.effects):
-        return replace(plant, effects=tuple(e for e in plant.effects if (e.id, e.joint) != here))
-    return without_functions(plant, effect.joint, describe(effect.id).traits.families)
 
 
 def locate_unknown(recording: RigRecording, explanation: Explanation) -> list[Mismatch]:

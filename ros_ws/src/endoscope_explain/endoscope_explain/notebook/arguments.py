@@ -23,10 +23,8 @@ _NUMBERS = {int: Integral, float: Real}
 def checked[**P, Result](
     call: Callable[P, Result], options: Mapping[str, Mapping[str, Any]] = MappingProxyType({})
 ) -> Callable[P, Result]:
-    """Refuse arguments of another type, or that an option does not allow, in one line.
-
-    No folder is named that nobody made.
-    """
+    """Refuse arguments of another type, or that an option does not allow, in one line."""
+    # No folder is named that nobody made.
     signature = inspect.signature(call)
     hints = {name: one.annotation for name, one in signature.parameters.items() if name != 'self'}
 

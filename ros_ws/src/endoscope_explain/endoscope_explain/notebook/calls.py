@@ -20,8 +20,7 @@ from endoscope_explain.case import ExplainedCase, Sources
 from endoscope_explain.explanation import NominalEstimate
 from endoscope_explain.many_bags import explained_cases
 from endoscope_explain.notebook.arguments import SCRATCH, checked, takes
-from endoscope_explain.notebook.arrays import commands_from
-from endoscope_explain.notebook.signals import Signals, read
+from endoscope_explain.notebook.signals import Signals, commands_from, read
 from endoscope_explain.options import Options
 from endoscope_explain.pipeline import Progress
 from endoscope_explain.report.sentences import terminal_text

@@ -8,9 +8,8 @@ slip right, so what the readings themselves scatter by, beyond their sensor's no
 from math import pi, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from endoscope_explain.recording import Array
 
 WINDOW = 250
 """Raw samples over which the scatter is estimated."""

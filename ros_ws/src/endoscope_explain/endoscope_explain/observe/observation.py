@@ -18,9 +18,15 @@ from endoscope_core.physics.description import PlantDescription, SensorParameter
 from endoscope_core.physics.on_stamps import hold_on_ticks
 from endoscope_core.physics.simulator import TICK
 from endoscope_explain.observe.noise import fast_scatter, rounding_error, step_read
-from endoscope_explain.recording import QUANTITY_UNITS, RigRecording, Series, signal_name
+from endoscope_explain.recording import (
+    QUANTITY_UNITS,
+    Array,
+    Mask,
+    RigRecording,
+    Series,
+    signal_name,
+)
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
@@ -220,25 +226,10 @@ def _channels(
     for quantity, wire, output, white, step in plan:
         if quantity not in measured:
             continue
-        period = 0.0 if quantity == 'bending' else ANALYSIS_PERIOD
         time, values = _valid_column(measured[quantity], j, wire, begin, ticks)
-        if not len(time):
-            continue
-        step = max(step, step_read(values))
-        rounding = rounding_error(step, white)
-        channels.append(
-            _channel(
-                signal_name(quantity, joint, wire),
-                quantity,
-                output,
-                time,
-                values,
-                period,
-                sqrt(white**2 + step**2 / 12.0 - rounding**2),
-                rounding,
-                quantity == 'tension',
-            )
-        )
+        if len(time):
+            signal = signal_name(quantity, joint, wire)
+            channels.append(_channel(signal, quantity, output, time, values, white, step))
     return tuple(channels)
 
 
@@ -258,24 +249,26 @@ def _channel(
     output: int,
     time: Array,
     values: Array,
-    period: float,
     white: float,
-    rounding: float,
-    may_chatter: bool,
+    step: float,
 ) -> Channel:
+    step = max(step, step_read(values))
+    rounding = rounding_error(step, white)
+    white = sqrt(white**2 + step**2 / 12.0 - rounding**2)
     place = time / TICK
     # Stamps on a tick, to the nanosecond, take the tick's own row.
     whole = np.round(place)
     place = np.where(np.abs(place - whole) < 1e-5, whole, place)
     tick = place.astype(np.int64)
-    if period > 0.0:
-        block = np.floor(time / period + 1e-6).astype(np.int64)
-        first = np.flatnonzero(np.r_[True, np.diff(block) > 0])
-    else:
+    if quantity == 'bending':
         first = np.arange(len(time))
+    else:
+        block = np.floor(time / ANALYSIS_PERIOD + 1e-6).astype(np.int64)
+        first = np.flatnonzero(np.r_[True, np.diff(block) > 0])
     count = np.diff(np.r_[first, len(time)]).astype(float)
     noise = np.sqrt(white**2 / count + rounding**2)
-    if may_chatter:
+    if quantity == 'tension':
+        # Wires slip.
         scatter = np.add.reduceat(fast_scatter(values, white), first) / count
         noise = np.sqrt(noise**2 + scatter**2 / count)
     mean_time = np.add.reduceat(time, first) / count
@@ -292,8 +285,6 @@ def _channel(
         rounding,
     )
 
-
-Mask = NDArray[np.bool_]
 
 SETTLED_S = 0.4
 """Time after the command's last change from which on a joint is at rest."""

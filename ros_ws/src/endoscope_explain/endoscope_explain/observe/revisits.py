@@ -11,15 +11,12 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from endoscope_core.physics.layout import IN_COMMAND
 from endoscope_core.physics.simulator import TICK
 from endoscope_explain.observe.observation import JointObservation
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from endoscope_explain.recording import Array, Mask
 
 EVERY_S = 0.02
 """Time between the moments compared."""
@@ -179,7 +176,10 @@ def held_out(observation: JointObservation) -> tuple[Mask, Mask]:
     seen = seen & (moments >= begun)
     if np.mean(seen) < LEAST_SHARE:
         judged = _in_last_block(time)
-        return (_far_from_last_block(time), judged) if judged.any() else _everything(time)
+        if judged.any():
+            return _far_from_last_block(time), judged
+        # There is no whole block to hold out.
+        return ~judged, ~judged
     judged = seen[np.clip(np.rint(time / apart).astype(np.int64), 0, len(seen) - 1)]
     near = np.interp(time, moments, _widened(seen, round(GAP_S / apart))) > 0.0
     return ~near, judged
@@ -188,12 +188,6 @@ def held_out(observation: JointObservation) -> tuple[Mask, Mask]:
 def _widened(seen: Mask, reach: int) -> Array:
     """How many held-out moments are within `reach` moments."""
     return np.convolve(seen, np.ones(2 * reach + 1), mode='same').round()
-
-
-def _everything(time: Array) -> tuple[Mask, Mask]:
-    # There is no whole block to hold out.
-    every = np.ones(len(time), dtype=bool)
-    return every, every
 
 
 def _in_last_block(time: Array) -> Mask:

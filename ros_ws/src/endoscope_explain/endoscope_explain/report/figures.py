@@ -5,10 +5,10 @@ from html import escape
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_explain.case import Ladder, NextExperiment
 from endoscope_explain.explanation import NINETY_PERCENT, UnknownTerm
+from endoscope_explain.recording import Array
 from endoscope_explain.report.numbers import PLANTS, digits, in_degrees
 from endoscope_explain.report.sentences import LEAST_SHARE, plain
 from endoscope_pages import Curve, Plot, figure_html
@@ -38,8 +38,6 @@ def look(name: str) -> dict[str, Any]:
     """How the curve of a model, or of what was measured, is drawn."""
     return {'label': LABEL[name], 'colour': COLOUR[name], 'dash': DASH[name]}
 
-
-Array = NDArray[np.float64]
 
 PREFIXED = ('N', 'm', 's')
 """What a unit that takes a prefix begins with: a force, a length or a time."""

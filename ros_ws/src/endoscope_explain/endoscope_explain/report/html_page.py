@@ -16,6 +16,7 @@ from endoscope_explain.observe.predicted_signals import RecordedView, view
 from endoscope_explain.observe.revisits import motion_repeats
 from endoscope_explain.report import left_open, numbers, sentences
 from endoscope_explain.report.figures import experiment_figure, ladder_figure, unknown_figure
+from endoscope_explain.report.left_open import visited_once
 from endoscope_explain.report.passage import (
     passage_figure,
     state_of,
@@ -23,7 +24,6 @@ from endoscope_explain.report.passage import (
     telling_signals,
     timeline_figure,
 )
-from endoscope_explain.report.visited_once import visited_once
 from endoscope_pages import render_page
 
 COLOURS = {

@@ -4,9 +4,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_core.physics.functions.places import Argument
 from endoscope_core.physics.layout import OUT_JOINT, OUT_MOTOR_SPEED
@@ -14,11 +14,10 @@ from endoscope_core.physics.simulator import TICK
 from endoscope_explain.case import Mismatch
 from endoscope_explain.locate.excess import WINDOW_S
 from endoscope_explain.observe.predicted_signals import RecordedView, SignalView
+from endoscope_explain.recording import Array, Mask
 from endoscope_explain.report.figures import TIME, look
 from endoscope_pages import Curve, Plot, figure_html
 from endoscope_pages.plots import COLUMNS
-
-Array = NDArray[np.float64]
 
 PASSAGE_S = 8.0
 MOST_SIGNALS = 3
@@ -35,6 +34,10 @@ STATES = {
     ('q', 'rad'): ('angle of the joint', 'deg', OUT_JOINT, math.degrees(1.0)),
 }
 """Words, unit, column of the simulated outputs and factor, by an argument's symbol and unit."""
+
+
+Drawn = list[tuple[str, Array, float]]
+"""Curves by the name of a model, or of what was measured, with their widths."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,8 @@ def state_of(
 def telling_signals(recorded: RecordedView, joint: str) -> tuple[SignalView, ...]:
     """Signals of a joint in which the best plant gains most on the described one."""
     views = recorded.of_joint(joint)
-    described, best = ends_of(views[0])
+    plants = list(views[0].predicted)
+    described, best = plants[0], plants[-1]
     if described == best:
         # There is nothing to gain: angle and tensions are shown.
         chosen = [v for v in views if v.quantity in ('bending', 'tension')]
@@ -97,56 +101,29 @@ def telling_passage(views: tuple[SignalView, ...]) -> tuple[float, float]:
 def passage_figure(views: tuple[SignalView, ...], over: Axis, passage: tuple[float, float]) -> str:
     """Plot signals, measured and predicted, by a state and in time, with each plant's misses."""
     loops, signals = [], []
+
+    def plot(
+        title: str, across: str, x: Array, drawn: Drawn, time: Array | None, **how: Any
+    ) -> Plot:
+        curves = (Curve(x=x, y=y, width=width, time=time, **look(name)) for name, y, width in drawn)
+        return Plot(title, across, tuple(curves), loop=time is not None, **how)
+
     for one in views:
         inside = (one.time >= passage[0]) & (one.time <= passage[1])
         time = one.time[inside]
         state = np.interp(time, over.time, over.values)
-        measured, *predicted = _curves(one, inside)
-        loops.append(
-            Plot(
-                _title(one),
-                f'{over.words} ({over.unit})',
-                tuple(
-                    Curve(x=state, y=values, width=width, time=time, **look(name))
-                    for name, values, width in (measured, *predicted)
-                ),
-                columns=COLUMNS // len(views),
-                loop=True,
-                height=250,
-            )
-        )
+        every = _curves(one, inside)
+        missed = [(name, every[0][1] - values, width) for name, values, width in every[1:]]
+        across, wide = f'{over.words} ({over.unit})', COLUMNS // len(views)
+        loops.append(plot(_title(one), across, state, every, time, columns=wide, height=250))
         signals += [
-            Plot(
-                _title(one),
-                TIME,
-                tuple(
-                    Curve(x=time, y=values, width=width, **look(name))
-                    for name, values, width in (measured, *predicted)
-                ),
-                columns=7,
-                height=130,
-            ),
-            Plot(
-                'measured - predicted',
-                TIME,
-                tuple(
-                    Curve(x=time, y=measured[1] - values, width=width, **look(name))
-                    for name, values, width in predicted
-                ),
-                columns=5,
-                height=130,
-            ),
+            plot(_title(one), TIME, time, every, None, columns=7, height=130),
+            plot('measured - predicted', TIME, time, missed, None, columns=5, height=130),
         ]
     return figure_html(loops + signals)
 
 
-def ends_of(one: SignalView) -> tuple[str, str]:
-    """Names of the described plant and of the best one."""
-    names = list(one.predicted)
-    return names[0], names[-1]
-
-
-def _curves(one: SignalView, inside: NDArray[np.bool_]) -> list[tuple[str, Array, float]]:
+def _curves(one: SignalView, inside: Mask) -> Drawn:
     convert = np.degrees if one.unit == 'rad' else np.asarray
     curves = [('measured', convert(one.measured[inside]), 2.4)]
     curves += [(name, convert(values[inside]), 1.3) for name, values in one.predicted.items()]

@@ -7,7 +7,7 @@ from endoscope_core.physics.effects import CATALOGUE, KNOWN
 from endoscope_explain.case import ExplainedCase, Mismatch, changed_parameters
 from endoscope_explain.explanation import NamedEffect, NominalEstimate, Verdict
 from endoscope_explain.recording import axis
-from endoscope_explain.report.left_open import function_of, in_words
+from endoscope_explain.report.left_open import function_of, in_words, visited_once
 from endoscope_explain.report.numbers import (
     PLANTS,
     digits,
@@ -17,7 +17,6 @@ from endoscope_explain.report.numbers import (
     numbers_of,
     shown,
 )
-from endoscope_explain.report.visited_once import visited_once
 
 HEADLINES = {
     Verdict.CONSISTENT: 'Simulation and recording agree',
@@ -169,7 +168,10 @@ def reservations(case: ExplainedCase) -> list[str]:
         'another form of the plant would leave.'
         for joint, place in case.explanation.repairs_form
     ]
-    off = _off(case)
+    plants = list(judged(case, case.ladder).values())
+    best = plants[-1] if plants else {}
+    # Signals that stay off with the best plant.
+    off = {signal: fit.ratio for signal, fit in best.items() if fit.ratio > STAYS}
     if off:
         signal, ratio = max(off.items(), key=lambda item: item[1])
         more = ''
@@ -184,13 +186,6 @@ def reservations(case: ExplainedCase) -> list[str]:
         shown_ones = [_one_differing(*key, e) for key, e in besides.items()]
         sentences.append(f'Besides, {_all(shown_ones)}.')
     return sentences
-
-
-def _off(case: ExplainedCase) -> dict[str, float]:
-    """Misfit over noise of the signals that stay off with the best plant."""
-    plants = list(judged(case, case.ladder).values())
-    best = plants[-1] if plants else {}
-    return {signal: fit.ratio for signal, fit in best.items() if fit.ratio > STAYS}
 
 
 def what_is_known(e: NominalEstimate) -> str:

@@ -59,6 +59,9 @@ def report_mapping(case: ExplainedCase) -> dict[str, Any]:
     """The content of report.json; ValueError if a number without a bound is not finite."""
     term, experiment = case.explanation.unknown, case.next_experiment
     band = case.inputs.sources.band
+    fit = _compared(case.ladder)
+    if case.validation:
+        fit['validation'] = {'recording': case.validation_name, **_compared(case.validation)}
     content = {
         'schema': SCHEMA,
         'verdict': str(case.verdict),
@@ -73,7 +76,7 @@ def report_mapping(case: ExplainedCase) -> dict[str, Any]:
             joint: {name: _nominal(name, e, band) for name, e in estimates.items()}
             for joint, estimates in case.explanation.parameters.items()
         },
-        'fit': _ladder(case),
+        'fit': fit,
         'symbolic': None if term is None else _symbolic(term),
         'next_experiment': None if experiment is None else _experiment(experiment),
         'runtime_s': case.runtime_s,
@@ -134,13 +137,6 @@ def _nominal(name: str, estimate: NominalEstimate, band: float) -> dict[str, Any
         'shown': estimate.shown,
         'together_with': estimate.together_with or None,
     }
-
-
-def _ladder(case: ExplainedCase) -> dict[str, Any]:
-    fit = _compared(case.ladder)
-    if case.validation:
-        fit['validation'] = {'recording': case.validation_name, **_compared(case.validation)}
-    return fit
 
 
 def _compared(ladder: Ladder) -> dict[str, Any]:
@@ -234,10 +230,7 @@ PLANT_YAML = 'plant.yaml'
 
 
 def write_report(case: ExplainedCase, folder: Path) -> dict[str, Any]:
-    """Write report.json, report.html, plant.yaml and any next motion to a folder that exists.
-
-    Returns what report.json contains.
-    """
+    """Write report.json, whose content it returns, report.html, plant.yaml and any next motion."""
     content = report_mapping(case)
     text = json.dumps(content, indent=1, allow_nan=False)
     (folder / REPORT_JSON).write_text(text + '\n', encoding='utf-8')

@@ -176,7 +176,11 @@ Trial = tuple[TrialFit | None, ...]
 def expanded(screen: Screened, jobs: int) -> list[Candidate]:
     """The parent with one term more, the best first."""
     parent = screen.parent.candidate
-    chosen = _worth_a_fit(_trials(screen, _likely_terms(screen, jobs), jobs), screen.known)
+    likely = [
+        _likely(*each, screen.known, jobs)
+        for each in zip(screen.behind, screen.ways, screen.parent.references, strict=True)
+    ]
+    chosen = _worth_a_fit(_trials(screen, likely, jobs), screen.known)
     grown = parallel_map(lambda seen: refit(seen, parent), chosen, jobs)
     grown.sort(key=lambda c: -c.evidence)
     if grown and not grown[0].is_noise and len(parent.fits) == 1:
@@ -200,14 +204,6 @@ def before_giving_up(screen: Screened, found: Sequence[Candidate], jobs: int) ->
         likely.append([t for own in chosen for t in own[:STARTS] if t.variant not in there])
     new = [seen for _, seen in _trials(screen, likely, jobs)]
     return parallel_map(lambda seen: converged(refit(seen, parent)), new, jobs)
-
-
-def _likely_terms(screen: Screened, jobs: int) -> list[list[Term]]:
-    """Terms that are worth a first fit, of each recording."""
-    return [
-        _likely(*each, screen.known, jobs)
-        for each in zip(screen.behind, screen.ways, screen.parent.references, strict=True)
-    ]
 
 
 def _trials(screen: Screened, likely: list[list[Term]], jobs: int) -> list[tuple[float, Trial]]:

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from endoscope_core.physics.description import TermSpec
@@ -15,21 +15,23 @@ from endoscope_explain.fit.family import Family
 from endoscope_explain.fit.free_parameters import COORDINATE
 from endoscope_explain.fit.intervals import covariance
 from endoscope_explain.fit.model import Fit
-
-Array = NDArray[np.float64]
+from endoscope_explain.recording import Array
 
 AS_GOOD = 0.95
 """Part of the function's posterior within which a formula is as good as the function."""
 _ANY = (
-    '{x}', '{x}**2', '{x} {x}**2', '{x} {x}**2 {x}**3', 'tanh(({x} - {c})/{s})',
-    'exp(-(({x} - {c})/{s})**2)', 'exp(-({x} - {low})/{s})', 'max(0, {x} - {c})',
-    'max(0, {c} - {x})', 'abs({x} - {c})', 'sin({x}/{s}) cos({x}/{s})',
+    ('{x}',), ('{x}**2',), ('{x}', '{x}**2'), ('{x}', '{x}**2', '{x}**3'),
+    ('tanh(({x} - {c})/{s})',), ('exp(-(({x} - {c})/{s})**2)',), ('exp(-({x} - {low})/{s})',),
+    ('max(0, {x} - {c})',), ('max(0, {c} - {x})',), ('abs({x} - {c})',),
+    ('sin({x}/{s})', 'cos({x}/{s})'),
 )  # fmt: skip
-_ODD = ('{x}', '{x} {x}**3', 'tanh({x}/{s})', 'sin({x}/{s})', '{x}*abs({x})')
-_EVEN = ('{x}**2', '{x}**2 {x}**4', 'abs({x})', 'exp(-({x}/{s})**2)', 'cos({x}/{s})')
+_ODD = (('{x}',), ('{x}', '{x}**3'), ('tanh({x}/{s})',), ('sin({x}/{s})',), ('{x}*abs({x})',))
+_EVEN = (
+    ('{x}**2',), ('{x}**2', '{x}**4'), ('abs({x})',), ('exp(-({x}/{s})**2)',), ('cos({x}/{s})',),
+)  # fmt: skip
 _HARMONICS = ('sin({w}*{x})', 'cos({w}*{x})', 'sin(2*{w}*{x})', 'cos(2*{w}*{x})',
               'sin(3*{w}*{x})', 'cos(3*{w}*{x})')  # fmt: skip
-_PERIODIC = tuple(' '.join(_HARMONICS[: 2 * count]) for count in (1, 2, 3))
+_PERIODIC = tuple(_HARMONICS[: 2 * count] for count in (1, 2, 3))
 _FORMS = {Shape.ODD: _ODD, Shape.EVEN: _EVEN, Shape.PERIODIC: _PERIODIC}
 _CENTRES = np.linspace(0.05, 0.95, 13)
 _WIDTHS = (0.03, 0.05, 0.08, 0.12, 0.2, 0.35, 0.6)
@@ -130,31 +132,16 @@ def _candidates(found: FittedFunction) -> Iterator[tuple[tuple[str, ...], int]]:
     family = found.family
     extent = family.high - family.low
     for form in _FORMS.get(family.place.shape, _ANY):
-        centres = _CENTRES if '{c}' in form else (0.0,)
-        widths = _WIDTHS if '{s}' in form else (1.0,)
-        for centre in centres:
-            for width in widths:
-                text = form.format(
-                    x=family.place.argument.symbol,
-                    c=f'{family.low + centre * extent:.4g}',
-                    s=f'{width * extent:.4g}',
-                    low=f'{family.low:.4g}',
-                    w=f'{2.0 * np.pi / extent:.12g}',
-                )
-                terms = tuple(text.replace(' - ', '~').split(' '))
-                terms = tuple(term.replace('~', ' - ') for term in _joined(terms))
-                yield terms, int('{c}' in form) + int('{s}' in form)
-
-
-def _joined(parts: tuple[str, ...]) -> tuple[str, ...]:
-    """Terms whose parentheses close: a comma within one is followed by a space."""
-    terms: list[str] = []
-    for part in parts:
-        if terms and terms[-1].count('(') > terms[-1].count(')'):
-            terms[-1] += f' {part}'
-        else:
-            terms.append(part)
-    return tuple(terms)
+        centred, wide = (any(number in term for term in form) for number in ('{c}', '{s}'))
+        for centre, width in product(_CENTRES if centred else (0.0,), _WIDTHS if wide else (1.0,)):
+            numbers = {
+                'x': family.place.argument.symbol,
+                'c': f'{family.low + centre * extent:.4g}',
+                's': f'{width * extent:.4g}',
+                'low': f'{family.low:.4g}',
+                'w': f'{2.0 * np.pi / extent:.12g}',
+            }
+            yield tuple(term.format_map(numbers) for term in form), centred + wide
 
 
 def _written(factors: Array, names: tuple[str, ...]) -> str:

@@ -5,7 +5,6 @@ them out.
 """
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -16,35 +15,6 @@ from endoscope_explain.search.refit import Candidate
 FALSE_ALARMS = 0.025
 """Chance that rigs in which nothing is missing show as much, above which no term is added: 2 % are
 wanted, and 39 rigs show no less."""
-
-
-class Judge(Protocol):
-    """How candidates with one term more are judged."""
-
-    @property
-    def form_is_worth(self) -> float:
-        """Evidence by which an error of form as large as what is left may mislead."""
-        ...
-
-    def stands_for(self, one: Candidate, top: Candidate) -> bool:
-        """Whether a candidate is confounded with the best one."""
-        ...
-
-    def formula_stands(self, formula: Candidate, function: Candidate, parent: Candidate) -> bool:
-        """Whether a formula stands for a function at its place that is better."""
-        ...
-
-    def p_value(self, best: Candidate, parent: Candidate) -> float:
-        """Chance that nothing is missing where the best candidate gains so much."""
-        ...
-
-    def confirms(self, best: Candidate, parent: Candidate) -> bool:
-        """Whether something is missing, and found."""
-        ...
-
-    def doubts(self, best: Candidate, parent: Candidate) -> str:
-        """Why it is not, in words."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -127,3 +97,7 @@ class InRecordingsLeftOut:
             return not confirmed, not near, -worth
 
         return tuple(sorted(found, key=order))
+
+
+Judge = BesideNullRigs | InRecordingsLeftOut
+"""How candidates with one term more are judged."""

@@ -10,7 +10,6 @@ anew.
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from endoscope_core.physics.layout import IN_COMMAND
@@ -18,8 +17,7 @@ from endoscope_explain.fit.evidence import counts, log_likelihood, mean_squares
 from endoscope_explain.fit.model import Fit
 from endoscope_explain.fit.pooled import foretold
 from endoscope_explain.observe.observation import JointObservation
-
-Array = NDArray[np.float64]
+from endoscope_explain.recording import Array
 
 LEAST_RECORDINGS = 3
 """Two show nothing of how much a gain scatters from one recording to the next."""

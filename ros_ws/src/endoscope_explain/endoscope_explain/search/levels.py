@@ -34,18 +34,9 @@ from endoscope_explain.search.judging import (
     Judge,
 )
 from endoscope_explain.search.left_out import LEAST_RECORDINGS
-from endoscope_explain.search.null_rigs import (
-    NO_DETECTABLE_GAIN,
-    null_of_several,
-    null_rigs,
-)
+from endoscope_explain.search.null_rigs import NO_DETECTABLE_GAIN, null_of_several, null_rigs
 from endoscope_explain.search.pairs import better_pair
-from endoscope_explain.search.refit import (
-    Candidate,
-    by_fine_derivatives,
-    candidate,
-    converged,
-)
+from endoscope_explain.search.refit import Candidate, by_fine_derivatives, candidate, converged
 from endoscope_explain.search.term import Term
 
 MOST_FITS, WORTH_A_FIT = 6, 1.0
@@ -164,12 +155,10 @@ def search(
     known: Collection[str] = (),
     report: Callable[[str], None] = lambda _: None,
 ) -> JointSearch:
-    """Search what is missing from a joint: `depth` terms at most beside nominal physics.
-
-    Of each recording there is the nominal plant refitted, and as described if given. In several of
-    a rig only effects are searched: a function has the range of one motion. What is `known`, by
-    name, from other recordings is fitted in any case.
-    """
+    """Search what is missing from a joint: `depth` terms at most beside nominal physics."""
+    # Of each recording there is the nominal plant refitted, and as described if given. In several
+    # of a rig only effects are searched: a function has the range of one motion. What is `known`,
+    # by name, from other recordings is fitted in any case.
     nominal = candidate((), *(references[0] for references in recordings))
     joint = nominal.fits[0].model.observation.joint
     depth += sum(each.in_every_rig for each in lacking(nominal.fits[0].model.base))
@@ -243,10 +232,8 @@ def _from_afar(one: Candidate) -> Candidate:
 def _level(
     screens: Sequence[Screened], base: Screened | None, jobs: int, *, other_numbers: bool
 ) -> Level:
-    """Candidates with one term more than those that were screened.
-
-    `base` is the screen of the last candidate that has no more than every rig has.
-    """
+    """Candidates with one term more than those that were screened."""
+    # `base` is the screen of the last candidate that has no more than every rig has.
     parents = [screen.parent.candidate for screen in screens]
     found = [each for screen in screens for each in expanded(screen, jobs)]
     found += [

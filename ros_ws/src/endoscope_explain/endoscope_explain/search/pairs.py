@@ -11,16 +11,14 @@ from dataclasses import dataclass
 from itertools import islice, product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_core.workers import parallel_map
 from endoscope_explain.fit.evidence import counts, log_likelihood
+from endoscope_explain.recording import Array
 from endoscope_explain.search.expansion import Parent, Screened
 from endoscope_explain.search.refit import Candidate, converged, refit, trial_fit
 from endoscope_explain.search.screen import Background, Directions, background
 from endoscope_explain.search.term import Term, Variant, mirrored
-
-Array = NDArray[np.float64]
 
 PAIRS = 2
 """Pairs that are fitted, of all and of those that hold the term that was found last: a pair costs
@@ -43,10 +41,8 @@ class Pair:
 def better_pair(
     base: Screened, found: Sequence[Candidate], jobs: int
 ) -> tuple[Parent, Candidate] | None:
-    """A pair that has more evidence than all found, and its first term alone; None for no such one.
-
-    `base` is the screen of the candidate that `found` has two terms more than, of one recording.
-    """
+    """A pair with more evidence than all found, and its first term alone; None without one."""
+    # `base` is the screen of the candidate that `found` has two terms more than, of one recording.
     best = max(found, key=lambda c: c.evidence, default=None)
     if best is None or best.is_noise:
         return None

@@ -1,14 +1,11 @@
 """Periods with which what a fit leaves repeats over time or another state."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import next_fast_len, rfft
 from scipy.signal import find_peaks
 
 from endoscope_explain.observe.observation import JointObservation
-
-Array = NDArray[np.float64]
-
+from endoscope_explain.recording import Array
 
 # Periods are peaks of the residuals' periodogram (Lomb, Astrophys. Space Sci. 39, 1976; Scargle,
 # Astrophys. J. 263, 1982): a period must be nearly right before a function of it shows at all.

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from endoscope_core.physics.functions.places import NODES
 from endoscope_explain.fit.evidence import (
@@ -20,15 +19,14 @@ from endoscope_explain.fit.evidence import (
     log_evidence,
     weights,
 )
-from endoscope_explain.fit.family import COEFFICIENTS, Family, visited_range
+from endoscope_explain.fit.family import COEFFICIENTS, visited_range
 from endoscope_explain.fit.free_parameters import COORDINATE
 from endoscope_explain.fit.model import Fit, JointModel, broyden_fit, fit, jacobian
 from endoscope_explain.fit.pooled import fit_together, with_common_numbers
 from endoscope_explain.fit.valleys import out_of_valleys
+from endoscope_explain.recording import Array
 from endoscope_explain.search.left_out import likelihoods
 from endoscope_explain.search.term import Term, states_of
-
-Array = NDArray[np.float64]
 
 FINER = (2 * COEFFICIENTS, 4 * COEFFICIENTS, NODES)
 """Coefficients of finer functions: twice as many each time, up to a value for every node."""
@@ -113,16 +111,15 @@ def trial_fit(references: tuple[Fit, ...], term: Term, offset: Array) -> TrialFi
     model = term.added_to(references[0].model)
     coarse = model.on_coarse_ticks(offset)
     weight = weights(model.observation, references[0].residuals)
-    best: TrialFit | None = None
-    for reference in references:
+
+    def begun_from(reference: Fit) -> TrialFit:
         theta = model.begun_at(reference.theta)
         new = list(range(len(reference.theta), len(theta)))
         derivative = np.hstack([reference.jacobian, jacobian(coarse, theta, new)])
         found = broyden_fit(coarse, theta, derivative, TRIAL_STEPS, weight)
-        if best is None or found.cost < best.cost:
-            best = TrialFit(term, model, coarse, found.theta, found.cost)
-    assert best is not None
-    return best
+        return TrialFit(term, model, coarse, found.theta, found.cost)
+
+    return min(map(begun_from, references), key=lambda each: each.cost)
 
 
 def cost_before(found: Fit) -> float:
@@ -134,16 +131,15 @@ def cost_before(found: Fit) -> float:
 def begun_beside(function: Fit, without: Fit, starts: Sequence[Term], offset: Array) -> TrialFit:
     """The start of a formula that leaves least beside the numbers of a fit with its function."""
     weight = weights(function.model.observation, without.residuals)
-    best: TrialFit | None = None
-    for term in starts:
+
+    def begun(term: Term) -> TrialFit:
         model = term.added_to(without.model)
         coarse = model.on_coarse_ticks(offset)
         theta = model.begun_at(function.theta[: len(without.theta)])
         cost = coarse.cost(weight * coarse.residuals(theta), theta)
-        if best is None or cost < best.cost:
-            best = TrialFit(term, model, coarse, theta, cost)
-    assert best is not None
-    return best
+        return TrialFit(term, model, coarse, theta, cost)
+
+    return min(map(begun, starts), key=lambda each: each.cost)
 
 
 def term_of(seen: Sequence[TrialFit | None]) -> Term:
@@ -179,7 +175,10 @@ def refined(one: Candidate, without: Fit, offset: Array) -> Candidate:
         assert term.family is not None
         before = best.fit.model.family_at(-1, best.fit.theta)
         # With what was missing, the joint goes further than it did without.
-        visited = (before.low, before.high) if before.repeats else _visited(best.fit, before)
+        visited = before.low, before.high
+        if not before.repeats:
+            tick = best.fit.model.observation.tick
+            visited = visited_range(before.place, states_of(best.fit), tick, before.lag)
         finer = replace(term, family=before.finer(count, visited))
         assert finer.family is not None
         model = finer.added_to(without.model)
@@ -198,12 +197,6 @@ def refined(one: Candidate, without: Fit, offset: Array) -> Candidate:
         if found.model.offset is not None:
             offset = found.model.offset
     return best
-
-
-def _visited(found: Fit, family: Family) -> tuple[float, float]:
-    """Range of a family's argument along a fit."""
-    tick = found.model.observation.tick
-    return visited_range(family.place, states_of(found), tick, family.lag)
 
 
 def _twice(model: JointModel, offset: Array | None, theta: Array, weight: Array) -> Fit:

@@ -24,6 +24,7 @@ from endoscope_explain.fit.free_parameters import (
 from endoscope_explain.fit.model import Fit, JointModel, simulate_joint
 from endoscope_explain.observe.observation import JointObservation
 from endoscope_explain.observe.revisits import motion_repeats
+from endoscope_explain.recording import Array
 from endoscope_explain.search.periods import likely_periods, period_bounds
 
 Variant = tuple[str, tuple[float, ...]]
@@ -141,7 +142,7 @@ def effects(found: Fit, left_out: tuple[str, ...] = ()) -> tuple[Term, ...]:
     )
 
 
-def functions(found: Fit, residuals: NDArray[np.float64]) -> tuple[Term, ...]:
+def functions(found: Fit, residuals: Array) -> tuple[Term, ...]:
     """Functions that may be added to a fit, as tall as their place allows at most."""
     # One for each place whose argument has moved; one for each likely period where functions repeat
     # themselves, and for some lags where their argument lags; one more that multiplies those that
@@ -167,7 +168,7 @@ def functions(found: Fit, residuals: NDArray[np.float64]) -> tuple[Term, ...]:
     return tuple(candidates)
 
 
-def _lags(observation: JointObservation) -> NDArray[np.float64]:
+def _lags(observation: JointObservation) -> Array:
     """Time constants to begin at, evenly in their logarithm."""
     # They are longer than ten ticks of the slowest sensor, and shorter than a third of the
     # recording: what is quicker is the state itself, and what is slower a function of time.
@@ -178,7 +179,7 @@ def _lags(observation: JointObservation) -> NDArray[np.float64]:
 
 def _lagging(
     place: Place,
-    states: dict[tuple[str, str], NDArray[np.float64]],
+    states: dict[tuple[str, str], Array],
     observation: JointObservation,
     lag: float,
 ) -> Family | None:
@@ -224,7 +225,7 @@ def mirrored(term: Term) -> Term | None:
     return replace(term, start=start) if changed else None
 
 
-def states_of(found: Fit) -> dict[tuple[str, str], NDArray[np.float64]]:
+def states_of(found: Fit) -> dict[tuple[str, str], Array]:
     """States that a function may depend on, along a fit; see `visited_states`."""
     parameters, _ = found.model.packed(found.theta)
     outputs = simulate_joint(found.model.observation, parameters, found.model.flags)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from endoscope_explain.fit.between_rows import with_command_between_rows
+from endoscope_explain.fit.nominal import with_command_between_rows
 from endoscope_explain.recording import Series
 
 PAUSE = slice(800, 1200)

@@ -123,10 +123,9 @@ def test_strengths_that_stand_for_one_another_are_not_all_nothing(one_joint):
     apart = np.array([1.0, -1.0]) * np.abs(found.theta[strengths]).max()
     form[np.ix_(strengths, strengths)] = np.outer(apart, apart)
     unsure = replace(found, moved_by_form=form)
-    told = intervals(unsure)
+    told = {each.name: each for each in intervals(unsure)}
     for name in ('linear', 'cubic'):
-        k = told.names.index(name)
-        assert told.low[k] < 0.0 < told.high[k]
+        assert told[name].low < 0.0 < told[name].high
     assert not may_be_absent(unsure, effect)
 
 
@@ -176,8 +175,8 @@ def test_another_form_widens_intervals_by_what_it_moves_the_numbers(one_joint):
     exponent = named.index('capstan_exponent')
     assert moved[exponent, exponent] > 0.0
     plain, wide = intervals(refitted), intervals(replace(refitted, moved_by_form=moved))
-    assert wide.high[exponent] > plain.high[exponent]
-    assert np.all(wide.high >= plain.high)
+    assert wide[exponent].high > plain[exponent].high
+    assert all(w.high >= p.high for w, p in zip(wide, plain, strict=True))
 
 
 def told_of(one_joint, desired, *, cells=True):
@@ -188,7 +187,7 @@ def told_of(one_joint, desired, *, cells=True):
     (observation,) = observe(recording, plant)
     packed = packed_joint(plant, 'bend_x')
     fitted, _ = nominal_references(observation, *packed)
-    return nominal_estimates(fitted, packed[0], {})
+    return nominal_estimates(fitted, packed[0])
 
 
 def test_a_number_that_moves_no_channel_is_not_shown(one_joint):

@@ -7,10 +7,10 @@ import pytest
 
 from endoscope_core.physics.description import EffectSpec, PlantDescription
 from endoscope_core.physics.layout import IN_OTHER_JOINT
+from endoscope_explain.explain_recording import stands_beside
 from endoscope_explain.fit.nominal import with_references
 from endoscope_explain.observe.observation import observe
 from endoscope_explain.search.levels import JointSearch, Level, search
-from endoscope_explain.search.other_joint import stands_beside
 
 
 @pytest.fixture(

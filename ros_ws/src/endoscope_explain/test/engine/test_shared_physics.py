@@ -5,7 +5,7 @@ import pytest
 
 from endoscope_core.physics.description import EffectSpec
 from endoscope_core.physics.effects import CATALOGUE
-from endoscope_explain.decide.given_physics import without_recording
+from endoscope_explain.decide.decision import without_recording
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.fit.model import fit
 from endoscope_explain.fit.nominal import with_references
@@ -13,7 +13,7 @@ from endoscope_explain.observe.observation import observe
 from endoscope_explain.search.null_rigs import null_of_several, shown
 from endoscope_explain.search.screen import background, directions
 from endoscope_explain.search.term import Term, effects, with_effect
-from endoscope_explain.shared_physics import shared_effects
+from endoscope_explain.takes import shared_effects
 
 pytestmark = pytest.mark.nightly
 

@@ -11,8 +11,8 @@ from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.physics.plant_file import plant_as_text
 from endoscope_core.signals.command_file import write_command_file
 from endoscope_core.signals.motions import motion_by_name
-from endoscope_explain.investigation.tracking import Tracked
-from endoscope_explain.investigation.tracking import tracked as tracked_of
+from endoscope_explain.investigation.motions import Tracked
+from endoscope_explain.investigation.motions import tracked as tracked_of
 from endoscope_nodes.client.plant_adoption import AdoptedPlants
 from endoscope_nodes.names import JOINTS, MASTER_NODE
 

@@ -18,7 +18,7 @@ from endoscope_core.errors import EndoscopeError
 from endoscope_core.physics import load_plant
 from endoscope_core.physics.plant_file import plant_from_mapping, save_plant
 from endoscope_explain.case import ExplainedCase, Sources
-from endoscope_explain.investigation.tracking import Tracked
+from endoscope_explain.investigation.motions import Tracked
 from endoscope_explain.many_bags import explained_case
 from endoscope_explain.observe.predicted_signals import view
 from endoscope_explain.recording import (

@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_limits
 
 from endoscope_core.atomic_output import write_text
 from endoscope_core.physics.effects import CATALOGUE, KNOWN
-from endoscope_explain.decide.conclusions import NOMINAL_UNITS
+from endoscope_explain.fit.intervals import NOMINAL_UNITS
 from endoscope_explain.report.numbers import digits, in_degrees
 from endoscope_explain.search.left_out import chance
 from endoscope_explain.search.levels import Level

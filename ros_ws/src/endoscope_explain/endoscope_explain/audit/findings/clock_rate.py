@@ -4,9 +4,8 @@ import numpy as np
 
 from endoscope_core.physics.effect import Symptom
 from endoscope_core.physics.effects import showing
-from endoscope_explain.audit.examined import Examined
+from endoscope_explain.audit.examined import Examined, retimed
 from endoscope_explain.audit.finding import FindingKind, Severity
-from endoscope_explain.audit.stamps import retimed
 from endoscope_explain.explanation import NINETY_PERCENT, Estimate
 from endoscope_explain.recording import Series
 

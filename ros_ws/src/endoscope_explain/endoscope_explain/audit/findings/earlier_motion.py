@@ -22,7 +22,7 @@ from endoscope_core.physics.packing import rest_state
 from endoscope_explain.audit.examined import Examined, without_times
 from endoscope_explain.audit.finding import FindingKind, Severity
 from endoscope_explain.observe.observation import ANALYSIS_PERIOD, JointObservation, observe
-from endoscope_explain.observe.predicted_signals import Flags, packed_rig
+from endoscope_explain.observe.predicted_signals import packed_rig
 from endoscope_explain.recording import LEAST_DURATION_S, MOVES_RAD, Array, Mask, RigRecording
 
 NOT_JUDGED = FindingKind(
@@ -47,10 +47,8 @@ FLIGHT = np.array([1e-3, 0.1])
 
 
 def find(seen: Examined) -> Examined:
-    """Estimate from where the motors had come when a recording began, as its `start`.
-
-    The time until it no longer shows by more than the noise is left out, as long as enough is left.
-    """
+    """Estimate as its `start` from where the motors had come when a recording began."""
+    # The time until it no longer shows by more than the noise is left out, if enough is left.
     recording = seen.recording
     observations = observe(recording, seen.plant)
     parameters, flags = packed_rig(observations, seen.plant)
@@ -91,7 +89,7 @@ class _Past:
     """What one joint's past does to its readings, by the plant as described."""
 
     def __init__(
-        self, observation: JointObservation, packed: Array, on: Flags, seen: float, reach: float
+        self, observation: JointObservation, packed: Array, on: Mask, seen: float, reach: float
     ) -> None:
         self._observation, self._packed, self._on = observation, packed, on
         self._reach = reach
@@ -247,11 +245,10 @@ class _Past:
 
 @dataclass(frozen=True)
 class _Start:
-    """A motor when its recording begins: angle in rad and speed in rad/s (2,), and ways back (K,).
+    """A motor when its recording begins: angle in rad and speed in rad/s (2,), ways back (K,)."""
 
-    A way back leads from a reversal, on the way that the motor came, to where it is. Until
-    `turns_until` s the motor is not as its servo would bring it from there.
-    """
+    # A way back leads from a reversal, on the way that the motor came, to where it is. Until
+    # `turns_until` s the motor is not as its servo would bring it from there.
 
     motor: Array
     backs: Array = field(default_factory=lambda: np.empty(0))

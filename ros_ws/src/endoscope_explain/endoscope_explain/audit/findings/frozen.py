@@ -30,10 +30,7 @@ SHARE = 0.5
 
 
 def find(seen: Examined) -> Examined:
-    """Compare with the plant, by which what stands still must move.
-
-    What did stand still is taken out by `without` when the rest has been compared with the plant.
-    """
+    """Compare with the plant, by which what stands still must move; see `without`."""
     recording = seen.recording
     if recording.duration < LEAST_DURATION_S:
         return seen

@@ -8,9 +8,8 @@ import numpy as np
 
 from endoscope_core.rig import Rig
 from endoscope_core.safety import MotionLimits, MotionShaper
-from endoscope_explain.audit.examined import Examined
+from endoscope_explain.audit.examined import Examined, find_gaps, usual_interval
 from endoscope_explain.audit.finding import FindingKind, Severity
-from endoscope_explain.audit.stamps import find_gaps, usual_interval
 from endoscope_explain.recording import Array, Series
 
 KIND = FindingKind(

@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_explain.audit.examined import Examined
+from endoscope_explain.audit.examined import GAP_FACTOR, Examined, runs, usual_interval
 from endoscope_explain.audit.finding import Column, Finding, FindingKind, Severity
-from endoscope_explain.audit.stamps import GAP_FACTOR, runs, usual_interval
 from endoscope_explain.recording import Array, Mask, RigRecording, Series
 
 KIND = FindingKind(

@@ -4,9 +4,8 @@ import numpy as np
 
 from endoscope_core.physics.effect import Symptom
 from endoscope_core.physics.effects import showing
-from endoscope_explain.audit.examined import Examined, without_times
+from endoscope_explain.audit.examined import Examined, find_gaps, usual_interval, without_times
 from endoscope_explain.audit.finding import Finding, FindingKind, Severity
-from endoscope_explain.audit.stamps import find_gaps, usual_interval
 from endoscope_explain.explanation import Estimate
 from endoscope_explain.recording import MOVES_RAD, RigRecording, Series
 

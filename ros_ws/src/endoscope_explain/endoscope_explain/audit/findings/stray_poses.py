@@ -5,11 +5,10 @@ from scipy.stats import norm, poisson
 
 from endoscope_core.physics.effect import Symptom
 from endoscope_core.physics.effects import showing
-from endoscope_explain.audit.examined import Examined
+from endoscope_explain.audit.examined import Examined, usual_interval
 from endoscope_explain.audit.finding import Finding, FindingKind, Severity
 from endoscope_explain.audit.findings.held_samples import COARSE
 from endoscope_explain.audit.plausibility import NORMAL_MEDIAN
-from endoscope_explain.audit.stamps import usual_interval
 from endoscope_explain.explanation import NINETY_PERCENT, Estimate
 from endoscope_explain.recording import Array, Mask, RigRecording
 
