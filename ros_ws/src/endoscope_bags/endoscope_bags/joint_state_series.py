@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from endoscope_bags.cdr_decoding import (
+from endoscope_bags.cdr import (
     QUANTITIES,
     Layout,
     LayoutGroup,

@@ -10,7 +10,7 @@ import numpy as np
 from endoscope_bags.chunk_sink import is_being_written
 from endoscope_bags.errors import BagError, BagNotFoundError
 from endoscope_bags.event_bag import Event, events_of
-from endoscope_bags.mcap_summary import McapSummary, read_summary
+from endoscope_bags.mcap_records import McapSummary, read_summary
 from endoscope_bags.metadata import SQLITE3, bag_files
 from endoscope_bags.recording import open_bag
 from endoscope_core.errors import EndoscopeError, printable

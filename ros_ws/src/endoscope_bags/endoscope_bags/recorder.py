@@ -6,8 +6,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 
 from endoscope_bags.errors import BagError
-from endoscope_bags.event_bag import held_since
-from endoscope_bags.event_keeping import EventKeeping
+from endoscope_bags.event_bag import EventKeeping, held_since
 from endoscope_bags.recent_messages import RecentMessages
 from endoscope_bags.recording_session import Arrival, RecordingSession, SessionReport
 from endoscope_bags.topic import QosProfile

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from rosbags.serde import SerdeError
 
-from endoscope_bags.cdr_decoding import HEAD_WITH_STAMP, QUANTITIES, Payloads, stamps_of_heads
+from endoscope_bags.cdr import HEAD_WITH_STAMP, QUANTITIES, Payloads, stamps_of_heads
 from endoscope_bags.errors import (
     BagError,
     CorruptBagError,
@@ -23,12 +23,20 @@ from endoscope_bags.joint_state_series import (
     decode_poses,
 )
 from endoscope_bags.mcap_scan import McapScan, scan_mcap
-from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED, typestore
+from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED, STRING, typestore
 from endoscope_bags.metadata import bag_files
 from endoscope_bags.stored_messages import StoredMessages
 from endoscope_bags.topic import MessageTimes, QosProfile, RawMessage, Topic, qos_from_yaml
 from endoscope_core.errors import FileError
-from endoscope_core.rig import Rig, rig_as_text, rig_from_text, shipped_rig
+from endoscope_core.rig import (
+    Rig,
+    RigKind,
+    kind_from_text,
+    kind_of_several,
+    rig_as_text,
+    rig_from_text,
+    shipped_rig,
+)
 from endoscope_core.schema import LARGEST
 
 IntArray = npt.NDArray[np.int64]
@@ -36,6 +44,8 @@ _NAME, _KEY = 'endoscope_rig', 'rig.yaml'
 """Of the metadata record, which stands before all messages."""
 EVENT_RECORD = 'endoscope_event'
 """Of the record with the reason of an event bag: a fault or an operator's mark."""
+RIG_KIND = 'rig/kind'
+"""Topic, in whatever namespace, of a std_msgs/String."""
 
 
 @contextmanager
@@ -361,3 +371,19 @@ def rig_of_bag(recording: Recording) -> Rig:
     """Return the rig that a recording carries; as shipped where it carries none."""
     text = recording.metadata.get(_NAME, {}).get(_KEY)
     return shipped_rig() if text is None else rig_from_text(text, f'the rig of {recording.path}')
+
+
+def kind_of_bag(recording: Recording) -> RigKind:
+    """Return the kind of a recording's rig: unknown where it has none that is readable.
+
+    With several, as after a change of servos, it is real only if all of them are.
+    """
+    kinds = []
+    for name, topic in recording.topics.items():
+        if not f'/{name}'.endswith(f'/{RIG_KIND}') or topic.type != STRING:
+            continue
+        try:
+            kinds += [kind_from_text(message.data) for _, message in recording.decoded(name)]
+        except MalformedMessageError:
+            kinds.append(RigKind())
+    return kind_of_several(kinds)

@@ -8,13 +8,12 @@ from typing import Any
 
 import msgspec
 
-from endoscope_console.alarms import Alarm, Urgency
+from endoscope_console.alarms import FORCE, GUARD, Alarm, TipAlarms, Urgency, number, tip_state
+from endoscope_console.clients import UNATTENDED_NS
 from endoscope_console.command import SLOWEST_HZ
 from endoscope_console.graph_side import GraphSide, is_calibrated
 from endoscope_console.operations import Operations
-from endoscope_console.teleop.lease import UNATTENDED_NS
 from endoscope_console.teleop.operator import STATE_NS, DeadManState, Reason
-from endoscope_console.tip import FORCE, GUARD, TipAlarms, number, tip_state
 from endoscope_core.rig import Rig
 from endoscope_nodes.client.calibration_result import NONE_OF_THEM
 from endoscope_nodes.client.graph_client import GraphClient

@@ -17,10 +17,10 @@ from endoscope_core.calibration import (
     with_zeros,
     zero_errors,
 )
-from endoscope_core.calibration.calibration_run import CalibrationCommand
-from endoscope_core.calibration.order_feedback import (
+from endoscope_core.calibration.calibration_run import (
     CALIBRATE,
     HOME,
+    CalibrationCommand,
     OrderCode,
     OrderFeedback,
     OrderState,

@@ -8,7 +8,6 @@ from endoscope_core.control.adopted_plant import (
     adopted_plant,
     plant_hash,
 )
-from endoscope_core.control.corrections import Corrections
 from endoscope_core.control.desired_motion import DesiredMotion
 from endoscope_core.control.feedforward import Feedforward, FeedforwardLaw, FeedforwardSettings
 from endoscope_core.control.handle import Handle, HandleRefusal, HandleSettings
@@ -16,7 +15,11 @@ from endoscope_core.control.internal_model import PhysicalParameters, bending_ra
 from endoscope_core.control.limits import MotorLimits
 from endoscope_core.control.physical_inverse import PhysicalInverse
 from endoscope_core.control.plant_learning import PlantLearning
-from endoscope_core.control.tracker_feedback import AdaptiveBacklashController, TrackerMeasurement
+from endoscope_core.control.tracker_feedback import (
+    AdaptiveBacklashController,
+    Corrections,
+    TrackerMeasurement,
+)
 
 __all__ = [
     'ADAPTIVE_PHYSICAL',

@@ -20,8 +20,9 @@ from endoscope_core.control.limits import (
     worked_off,
 )
 from endoscope_core.control.physical_inverse import AdaptivePhysicalInverse, PhysicalInverse
+from endoscope_core.hysteresis import MODELS, HysteresisParameters
 from endoscope_core.hysteresis.dahl import dahl_step
-from endoscope_core.hysteresis.inverse import MODELS, DirectInverse, HysteresisParameters
+from endoscope_core.hysteresis.memory_model import DirectInverse
 
 Vector = Sequence[float] | NDArray[np.float64]
 LawParameters = HysteresisParameters | PhysicalParameters

@@ -17,11 +17,12 @@ from endoscope_core.choices import (
 )
 from endoscope_core.control import FeedforwardLaw, PhysicalParameters
 from endoscope_core.errors import FileError, InputError
-from endoscope_core.identification.class_parameters import (
+from endoscope_core.identification.updated_table import (
+    LawParameters,
+    UpdatedTable,
     load_class_parameters,
     parameters_for_class,
 )
-from endoscope_core.identification.updated_table import LawParameters, UpdatedTable
 from endoscope_core.safety import BendingRange
 
 

@@ -2,9 +2,11 @@
 
 from endoscope_core.kinematics.constant_curvature import (
     Hinge,
+    TipVelocity,
     Transform,
     Vertebrae,
     bending_from_orientation,
+    bending_rate,
     centre_line,
     tip_lever,
     tip_pose,
@@ -15,7 +17,6 @@ from endoscope_core.kinematics.straight_registration import (
     StraightRegistration,
     register_straight,
 )
-from endoscope_core.kinematics.tip_velocity import TipVelocity, bending_rate
 
 __all__ = [
     'Hinge',

@@ -11,13 +11,13 @@ from endoscope_core.names import JOINTS
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.rig import Rig
 from endoscope_core.signals import Signal, hold, sequence
-from endoscope_core.signals.command_file import CommandTable
 from endoscope_core.signals.motions import (
     again_with_hold,
     chirp,
     steps_with_holds,
     there_and_back,
 )
+from endoscope_core.signals.sampled_motion import CommandTable
 from endoscope_explain.case import NextExperiment
 from endoscope_explain.experiment_motions import SAMPLE_S, as_played
 from endoscope_explain.imagined_motion import answer_to, is_safe

@@ -15,7 +15,11 @@ from endoscope_core.names import JOINTS
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.rig import Rig
 from endoscope_core.signals import move, non_periodic_signal, sequence
-from endoscope_core.signals.command_file import CommandTable, read_command_file, write_command_file
+from endoscope_core.signals.sampled_motion import (
+    CommandTable,
+    read_command_file,
+    write_command_file,
+)
 from endoscope_explain.experiment_motions import SAMPLE_S, as_played
 from endoscope_explain.investigation import log as logs
 from endoscope_explain.investigation.log import Log, Tracking

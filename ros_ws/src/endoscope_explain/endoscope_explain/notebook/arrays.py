@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from endoscope_bags import BagWriter, MessageStream
-from endoscope_bags.cdr_encoding import encode_joint_states
+from endoscope_bags.cdr import encode_joint_states
 from endoscope_bags.message_types import JOINT_STATE
 from endoscope_core.errors import InputError, nearest
 from endoscope_core.names import JOINTS

@@ -9,7 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
 
-from endoscope_core.calibration.order_feedback import OrderState
+from endoscope_core.calibration.calibration_run import OrderState
 from endoscope_core.errors import FileError
 from endoscope_core.safety import AdoptionCode, BendingRange
 from endoscope_nodes import names

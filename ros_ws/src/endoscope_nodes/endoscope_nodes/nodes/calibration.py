@@ -10,7 +10,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from threadpoolctl import threadpool_limits
 
-from endoscope_core.calibration.order_feedback import (
+from endoscope_core.calibration.calibration_run import (
     CALIBRATE,
     HOME,
     OrderCode,
@@ -35,7 +35,7 @@ from endoscope_nodes.client.calibration_result import (
     refused_result,
     successful_result,
 )
-from endoscope_nodes.client.order_feedback import feedback_message
+from endoscope_nodes.client.graph_listener import feedback_message
 from endoscope_nodes.runtime.beside import Beside
 from endoscope_nodes.runtime.diagnostics import OK, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode

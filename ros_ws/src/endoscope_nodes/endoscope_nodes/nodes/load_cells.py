@@ -13,10 +13,10 @@ from endoscope_devices.load_cells import (
     tare_path,
 )
 from endoscope_nodes import names
-from endoscope_nodes.runtime.device_parameters import LoadCellsParameters
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, STALE, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
+from endoscope_nodes.runtime.node_parameters import LoadCellsParameters
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import LOCK_STEP, SENSOR_ASKED, SENSOR_OFFERED
 from endoscope_nodes.runtime.streams import JointPublisher, JointSample, JointSubscription

@@ -10,15 +10,15 @@ from endoscope_core.physics.plant_file import plant_as_text
 from endoscope_core.rig import Kind, RigKind, digest, rig_as_text
 from endoscope_core.safety import CommandLimits, MotionLimits, OperatingState, Refusal, ShaftMotion
 from endoscope_devices.device import DeviceError, MotorDevice
+from endoscope_devices.dynamixel.bring_up import BusSettings, ServoMount
 from endoscope_devices.dynamixel.control_table import BAUD_CODES
 from endoscope_devices.dynamixel.dynamixel_motors import DynamixelMotors
-from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
 from endoscope_devices.simulated_slave import SimulatedSlave
 from endoscope_nodes import names
-from endoscope_nodes.runtime.device_parameters import DynamixelParameters, MotorDriverParameters
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
+from endoscope_nodes.runtime.node_parameters import DynamixelParameters, MotorDriverParameters
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import COMMAND, LOCK_STEP, RESULT, SENSOR_OFFERED
 from endoscope_nodes.runtime.streams import JointPublisher, JointSample, JointSubscription

@@ -6,7 +6,7 @@ from concurrent.futures import Future
 
 from diagnostic_msgs.msg import DiagnosticArray
 
-from endoscope_core.calibration.order_feedback import OrderState
+from endoscope_core.calibration.calibration_run import OrderState
 from endoscope_core.choices import BY_ADOPTED, PHYSICAL
 from endoscope_core.compensation.law_in_force import LawInForce, Selection
 from endoscope_core.control import AdoptedPlant, AdoptionError, adopted_plant

@@ -8,7 +8,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from endoscope_bags import RawMessage, Recording, Topic, open_bag
-from endoscope_bags.cdr_encoding import encode_clock
+from endoscope_bags.cdr import encode_clock
 from endoscope_bags.errors import BagError
 from endoscope_nodes.names import CLOCK, DIAGNOSTICS, MOTOR_COMMAND, MOTOR_MEASURED
 from endoscope_nodes.runtime.diagnostics import OK, Report

@@ -11,7 +11,7 @@ from rclpy.task import Future
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
 
-from endoscope_bags.cdr_encoding import encode_clock
+from endoscope_bags.cdr import encode_clock
 from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.names import CLOCK_NODE, FACTOR, SLAVE_MEASURED
 from endoscope_nodes.runtime.diagnostics import OK, Report

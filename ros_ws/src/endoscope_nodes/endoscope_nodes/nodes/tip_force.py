@@ -9,14 +9,14 @@ from geometry_msgs.msg import WrenchStamped
 from rclpy.time import Time
 from threadpoolctl import threadpool_limits
 
-from endoscope_core.calibration.order_feedback import OrderState
+from endoscope_core.calibration.calibration_run import OrderState
 from endoscope_core.errors import FileError
 from endoscope_core.kinematics import Vertebrae
 from endoscope_core.physics import PlantDescription
 from endoscope_core.tip_force import State, TipForce, TipForceEstimator
 from endoscope_core.tip_force.free_motion import BLOCK_S
 from endoscope_nodes import names
-from endoscope_nodes.client.order_feedback import feedback_of
+from endoscope_nodes.client.graph_listener import feedback_of
 from endoscope_nodes.client.plant_adoption import PlantInForce
 from endoscope_nodes.runtime.beside import Beside
 from endoscope_nodes.runtime.diagnostics import OK, WARN, Report

@@ -15,7 +15,7 @@ from std_srvs.srv import Trigger
 from endoscope_nodes.names import CLOCK_NODE
 from endoscope_nodes.runtime.declared_parameters import declare_parameters
 from endoscope_nodes.runtime.diagnostics import Diagnostics
-from endoscope_nodes.runtime.eventless_node import EventlessNode
+from endoscope_nodes.runtime.environment import EventlessNode
 from endoscope_nodes.runtime.node_context import NAMESPACE, NodeContext
 from endoscope_nodes.runtime.node_parameters import FOR_SESSION
 from endoscope_nodes.runtime.parameters import ParameterError, changed

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
-from endoscope_bags.cdr_decoding import Payloads
+from endoscope_bags.cdr import Payloads
 from endoscope_bags.errors import BagError
 from endoscope_bags.joint_state_series import JointStateSeries, decode_joint_states
 from endoscope_nodes import topics
