@@ -74,10 +74,7 @@ def event_bags(folder: Path) -> list[Path]:
 
 
 def new_event_bag(folder: Path, kind: str, most: int) -> Path:
-    """Return the path for the bag of an event; BagError if there are `most` of them already.
-
-    Old bags are never deleted automatically.
-    """
+    """Path for the bag of an event; BagError if there are `most`: none is ever deleted."""
     if len(event_bags(folder)) >= most:
         raise BagError(
             f'{folder} has {most} bags of faults and marks already: read them, and move or delete '
@@ -91,11 +88,9 @@ def new_event_bag(folder: Path, kind: str, most: int) -> Path:
 
 
 class EventBag:
-    """One bag of an event, from the event to its end.
+    """One bag of an event, from the event to its end, begun once the reason is known.
 
-    The messages before it are those in the ring buffer at the event. A few of them are written
-    whenever messages arrive, so that no caller waits. Writing starts with `begin`, as a rule once
-    the reason is known.
+    A few of the messages before it are written whenever others arrive, so that no caller waits.
     """
 
     def __init__(self, recent: RecentMessages, kind: str, at_ns: int, reason: str = '') -> None:
@@ -180,10 +175,8 @@ class _Writing:
 class EventKeeping:
     """Keeps the last seconds in memory, for the bag of a fault or of what an operator marks.
 
-    `folder` is where the bags go, at most `most` of them, and `open_session` opens one there with
-    metadata records. `collect` has what waits to be read handed to :meth:`go_on`, and `notify`
-    takes what came of a bag, and whether that is an error. Times in ns: `now_ns` by the clock of
-    the recording, `steady_ns` by one that nobody sets.
+    `collect` has what waits to be read handed to :meth:`go_on`, and `notify` takes what came of a
+    bag, and whether that is an error. `steady_ns` is by a clock that nobody sets.
     """
 
     def __init__(

@@ -20,13 +20,7 @@ ROBOT_TYPE = 'endoscope'
 
 
 def lerobot_dataset() -> Any:
-    """Return LeRobot's class of data sets.
-
-    Raises
-    ------
-    EndoscopeError
-        This environment has no LeRobot.
-    """
+    """LeRobot's class of data sets; EndoscopeError where this environment has none."""
     try:
         from lerobot.datasets import LeRobotDataset
     except ImportError as error:
@@ -45,29 +39,10 @@ def write_lerobot(
     task: str,
     card: str,
 ) -> None:
-    """Write a data set to a new or empty folder, whole or not at all.
+    """Write episodes at `fps` frames a second to a new or empty folder, whole or not at all.
 
-    Parameters
-    ----------
-    folder
-        Its name becomes that of the data set.
-    channels
-        Whose features the episodes have.
-    episodes
-        At `fps` frames a second.
-    fps
-        Of the data set.
-    task
-        What was done in all episodes, in words.
-    card
-        Becomes README.md.
-
-    Raises
-    ------
-    EndoscopeError
-        This environment has no LeRobot.
-    OutputError
-        The folder cannot be written, or has something in it.
+    `task` says what was done in all of them, `card` becomes README.md. EndoscopeError without
+    LeRobot, OutputError if the folder cannot be written or has something in it.
     """
     library = lerobot_dataset()
     features = {
@@ -189,23 +164,7 @@ def dataset_card(
     kind: Kind,
     delays: Sequence[Sequence[ChannelDelay]],
 ) -> str:
-    """Return the card as Markdown.
-
-    Parameters
-    ----------
-    title
-        Of the data set.
-    recordings
-        With the same channels each.
-    episodes
-        In the order of the data set.
-    fps
-        Frames a second.
-    kind
-        Of the rig, as the recordings have it.
-    delays
-        Of each recording; a channel without one is unknown.
-    """
+    """The card of a data set as Markdown; a channel that `delays` lack is of unknown delay."""
     frames = sum(map(len, episodes))
     lacking = recordings[0].lacking
     rows = [

@@ -47,10 +47,9 @@ class BagEntry:
 
 
 def bags_in(folder: Path) -> list[BagEntry]:
-    """List all recordings of a folder, oldest first.
+    """List all recordings of a folder, oldest first, an unreadable one with its error.
 
-    Of a finished recording only the summary is read, so that damage before it is not noticed.
-    BagNotFoundError if there is no such folder; an unreadable recording is listed with its error.
+    Of a finished one only the summary is read. BagNotFoundError if there is no such folder.
     """
     if not folder.is_dir():
         raise BagNotFoundError(f'{folder}: no such folder')

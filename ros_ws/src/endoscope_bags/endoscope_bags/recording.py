@@ -374,10 +374,7 @@ def rig_of_bag(recording: Recording) -> Rig:
 
 
 def kind_of_bag(recording: Recording) -> RigKind:
-    """Return the kind of a recording's rig: unknown where it has none that is readable.
-
-    With several, as after a change of servos, it is real only if all of them are.
-    """
+    """Kind of a recording's rig: of several, as after a change of servos, real only if all are."""
     kinds = []
     for name, topic in recording.topics.items():
         if not f'/{name}'.endswith(f'/{RIG_KIND}') or topic.type != STRING:

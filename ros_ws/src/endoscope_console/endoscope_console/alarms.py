@@ -37,10 +37,7 @@ class Alarm:
 
 
 class Alarms:
-    """Alarms that are shown: those present, and latched ones that were not acknowledged.
-
-    Acknowledging records that an alarm was seen; it neither resolves nor enables anything.
-    """
+    """Alarms that are present, and latched ones until they are acknowledged: seen, not resolved."""
 
     def __init__(self) -> None:
         self._present: dict[str, Alarm] = {}
@@ -93,10 +90,9 @@ def number(health: Health, key: str) -> float | None:
 
 
 class TipAlarms:
-    """Alarms of the tip: of a force above `alarm_n` N, and of the guard.
+    """Alarms of the guard and of a force above `alarm_n` N, which does not flicker.
 
-    The first stays for a second after its cause, with the largest force since it began: it neither
-    flickers nor changes with every sample.
+    It stays for a second after its cause, with the largest force since it began.
     """
 
     def __init__(self, alarm_n: float) -> None:

@@ -166,11 +166,10 @@ class CalibrationOrder(Order):
 
 
 class Orders:
-    """What calibration has been ordered: one order at a time, begun only where it can go well.
+    """One order of calibration at a time, aborted by whatever makes it worthless or doubtful.
 
-    Whatever makes the recording worthless or motion doubtful aborts it. `return_speed`, in rad/s,
-    and `rest`, in s, are those of :class:`CalibrationRun`; `remedy` is how to work without
-    calibration.
+    `return_speed`, in rad/s, and `rest`, in s, are those of :class:`CalibrationRun`; `remedy` is
+    how to work without calibration.
     """
 
     def __init__(

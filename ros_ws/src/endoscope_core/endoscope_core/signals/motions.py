@@ -90,8 +90,7 @@ def triangle(amplitude: float, speed: float) -> Signal:
 def there_and_back(reach: float, speed: float) -> Signal:
     """A rise and a fall between -+`reach` (rad) by :func:`ramps`, which end where they began.
 
-    Both branches of a hysteresis show only in a stroke that is wider than the backlash, and what
-    depends on the bend only in what it is wider by: 40 deg more are enough.
+    40 deg beyond the backlash show both branches, and what depends on the bend.
     """
     return replace(ramps((0.0, reach, -reach, reach, 0.0), speed), name='there and back')
 

@@ -121,11 +121,9 @@ def wanted_registers(settings: BusSettings) -> dict[Register, int]:
 
 
 def bring_up(bus: PacketHandler, device: int, settings: BusSettings) -> ServoModel:
-    """Set one servo up with its torque off, and return its model.
+    """Set one servo up with its torque off, and return its model; BusError if it does not take it.
 
-    Registers of the EEPROM, which wears, are written only where they differ. BusError where the
-    servo does not answer, is another model, reports a hardware error, or does not keep what was
-    written.
+    Registers of the EEPROM, which wears, are written only where they differ.
     """
     number, _ = bus.ping(device)
     if number not in MODELS:

@@ -98,11 +98,7 @@ class FrameClock:
         self._frame = 0
 
     def stamp(self, frame: int, asked_ns: int) -> int:
-        """Time of a frame seen for the first time, in ns, never later than `asked_ns`.
-
-        The frame's number is larger than the last; `asked_ns` is when the reply that brought it was
-        asked for, in ns of the same clock.
-        """
+        """Time in ns of a frame newer than the last, never after its reply was asked for."""
         seen = asked_ns - frame * self._period_ns
         self._offset_ns = seen if self._offset_ns is None else min(seen, self._latest_ns(frame))
         self._frame = frame

@@ -82,10 +82,7 @@ class Line[Opened: serial.Serial | socket.socket](ABC):
 
 
 class SerialLine(Line[serial.Serial]):
-    """A serial port, silent between frames as Modbus over Serial Line V1.02, 2.5.1.1 asks for.
-
-    That is 3.5 characters, or 1.75 ms above 19200 baud.
-    """
+    """A serial port, silent 3.5 characters between frames (Modbus over Serial Line, 2.5.1.1)."""
 
     def __init__(self, port: str, settings: SerialSettings) -> None:
         super().__init__(f'serial port {port}')
@@ -125,10 +122,7 @@ class SerialLine(Line[serial.Serial]):
 
 
 class TcpLine(Line[socket.socket]):
-    """A TCP connection to ``HOST`` or ``HOST:PORT``, by default port 502.
-
-    DeviceError where the address cannot be understood.
-    """
+    """A TCP connection to ``HOST`` or ``HOST:PORT`` (502); DeviceError for another address."""
 
     def __init__(self, address: str) -> None:
         host, _, port = address.partition(':')

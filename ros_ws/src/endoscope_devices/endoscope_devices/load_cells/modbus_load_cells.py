@@ -45,13 +45,10 @@ _KEPT = 2000
 class ChannelCheck:
     """Judges each reading of one cell.
 
-    Broken: the count is not a number, or beyond ``broken_below`` and ``broken_above``, where only
-    an open bridge drives the amplifier. Saturated: beyond ``saturated_*``. Frozen: not one count of
-    change for ``frozen_after`` seconds; the noise of a working cell changes its last digit.
-    Spiking: a change faster than ``spike_rate``; three consistent readings in a row are a new
-    level. With five spikes in a second the whole channel is rejected. An old reply of Modbus RTU,
-    which has no transaction number, is detected only here: delayed and sent again, it is dropped
-    where the tension has changed by more than a wire can in one interval.
+    Broken: only an open bridge drives the amplifier there. Frozen: the noise of a working cell
+    changes its last digit. Spiking: faster than ``spike_rate``, until three readings agree on a new
+    level. An old reply of Modbus RTU, which has no transaction number, is detected only here, where
+    the tension has changed by more than a wire can in one interval.
     """
 
     def __init__(self, wire: str, cell: WireCell, limits: FaultLimits) -> None:
@@ -72,10 +69,7 @@ class ChannelCheck:
         self._agreeing = 0
 
     def read(self, time_ns: int, count: float) -> float | None:
-        """Take a count at a monotonic time in ns; give the tension in N where it can be believed.
-
-        None during a fault, and for its first ``CONFIRMATIONS - 1`` good readings after.
-        """
+        """Take a count at steady ns; the tension in N unless a fault is there or just over."""
         trouble = self._trouble(time_ns, count)
         if trouble:
             self.fault = f'{self._wire}: {trouble}'
@@ -172,11 +166,7 @@ class LoadCellDevice(Protocol):
 
 
 class ModbusLoadCells(ReadingThread[WireReading]):
-    """Reads all wires at the calibration's rate and keeps the valid readings.
-
-    A reading with one invalid channel is dropped as a whole.  A lost line is reopened for as long
-    as the device is open.
-    """
+    """Reads all wires, whole readings or none; a lost line is reopened while it is open."""
 
     def __init__(self, calibration: LoadCellCalibration, line: Line, framing: Framing) -> None:
         super().__init__('load cells', _KEPT)

@@ -64,10 +64,7 @@ class Health:
 
 
 class GraphListener(ClosedOnExit):
-    """Listens to a graph; it hears only while it waits for something.
-
-    `serve` serves the node for so many seconds; what is waited for is looked at in between.
-    """
+    """Listens to a graph while it waits for something, in which `serve` serves the node."""
 
     def __init__(
         self,
@@ -195,11 +192,7 @@ class GraphListener(ClosedOnExit):
         return sorted({name for name, space in found if space == namespace and name != own})
 
     def wait_until(self, condition: Callable[[], bool], patience_s: float = PATIENCE_S) -> bool:
-        """Listen until something has come true, or for so long; whether it has.
-
-        So long is meant in the graph's time where that is slower than real time, however slow; a
-        graph whose time stands still is waited for as long.
-        """
+        """Listen until it is true, or for so long by the slower of two clocks; whether it is."""
         begun_s = moved_s = self._clock()
         self.hear()
         graph_ns, passed_ns = self.graph_ns, 0

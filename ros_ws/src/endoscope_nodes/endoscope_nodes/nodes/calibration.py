@@ -51,11 +51,9 @@ from endoscope_nodes.safety.streams import StreamWatch
 class CalibrationNode(EndoscopeNode):
     """Serves ``calibration/run``, ``slave/home`` and ``home``; publishes ``calibration/result``.
 
-    A service answers at once, with the reason if it refuses. How far an order is follows on
-    ``calibration/feedback``, the result on its topic, and as numbers for programs that plot.
-    Where an order is aborted the commands stop, the slave holds or goes back to the master by a
-    ramp, and the result says why. Tensions unlike any known are refused: the result names no
-    class, and nothing is compensated.
+    A service answers at once; how an order fares is on ``calibration/feedback``. Where it is
+    aborted the slave holds or goes back to the master by a ramp, and the result says why. Tensions
+    unlike any known are refused: nothing is compensated.
     """
 
     def __init__(self, context: NodeContext) -> None:

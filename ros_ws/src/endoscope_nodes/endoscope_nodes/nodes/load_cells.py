@@ -24,11 +24,9 @@ from endoscope_nodes.runtime.ticker import SampleClock
 
 
 class LoadCellsNode(EndoscopeNode):
-    """Publishes ``wires/measured_js``: the tension of four wires in N.
+    """Publishes ``wires/measured_js``: the tension of four wires in N, none where one is faulty.
 
-    A reading in which a cell is broken, saturated, frozen or spiking is not published; the cell is
-    named in the diagnostics.  ``~/tare`` takes the tension of the last second for zero, and keeps
-    it beside the calibration file.
+    ``~/tare`` takes the tension of the last second for zero, and keeps it.
     """
 
     def __init__(self, context: NodeContext) -> None:

@@ -32,13 +32,10 @@ _REPEATED_NS = 50_000_000
 class MotorDriverNode(EndoscopeNode):
     """Obeys ``motor/servo_jp`` as far as it is safe, and publishes what the shafts do.
 
-    A command is obeyed while it belongs to the motion session that the node takes part in, has one
-    sender and passes the gate; what it asks for goes through the motion shaper.  Every tick the
-    shaped goal goes to the device and its reading is published, and the goal where it changes.
-    Without fresh commands, and outside of a session, the shafts go to the position measured at that
-    moment and hold it; only ``DISABLED`` lets them go.  The simulated slave also publishes the
-    noise-free tensions and angles that the simulated load cells and tracker read.  On ``rig/kind``
-    it says whether what it drives is simulated, emulated or real.
+    A command of the open motion session, from one sender, passes gate and motion shaper; every tick
+    the goal goes to the device and its reading is published. Without fresh commands the shafts go
+    to the position measured at that moment and hold it; only ``DISABLED`` lets them go. The
+    simulated slave also publishes what the simulated load cells and tracker read.
     """
 
     def __init__(self, context: NodeContext) -> None:

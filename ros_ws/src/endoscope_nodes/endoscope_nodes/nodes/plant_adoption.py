@@ -25,10 +25,8 @@ _LOOK_S = 0.05
 class PlantAdoption:
     """Answers ``compensator/adopt``, and says on ``compensator/plant`` what is in force.
 
-    A request is obeyed in the motion session that it names, from one sender, and only at rest: when
-    it comes, and once the plant has been tried, which takes a moment. `check_rest` raises an
-    AdoptionError where the slave does not rest, or is bent further than a plant allows; `select`
-    changes what selects the feed-forward.
+    A request is obeyed in its motion session, from one sender, and at rest when it comes and once
+    the plant has been tried: `check_rest` raises an AdoptionError. `select` changes the selection.
     """
 
     def __init__(

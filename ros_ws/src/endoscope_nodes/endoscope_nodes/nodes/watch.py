@@ -34,9 +34,7 @@ _STREAMS = {
 class WatchNode(RigFollower[None]):
     """Tells on ``/diagnostics`` that the rig is no longer the one described: where, since when.
 
-    The rig is compared with the plant in force: the adopted one, or else the one described. What
-    is heard is judged four times a second in a thread of its own; the executor is not concerned. An
-    alarm stays until ``watch/restart`` or until another plant is in force, and has the recorder
+    An alarm stays until ``watch/restart`` or until another plant is in force, and has the recorder
     keep the last seconds.
     """
 

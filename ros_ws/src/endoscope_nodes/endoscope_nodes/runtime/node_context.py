@@ -60,9 +60,8 @@ def load_slave(source: str, path: str) -> PlantDescription:
 def all_matched(nodes: Sequence[Node]) -> bool:
     """Say whether no message between these nodes would be lost from now on.
 
-    Both sides have to know of each other, and each finds the other at its own time. Endpoints of
-    other nodes do not count. A node of this process that reads topics by other means than
-    subscriptions of its own lists them in ``extra_readers() -> [(topic, publishers found)]``.
+    Both sides have to know of each other. A node that reads topics past its subscriptions lists
+    them in ``extra_readers() -> [(topic, publishers found)]``.
     """
     here = {(node.get_name(), node.get_namespace()) for node in nodes}
     for node in nodes:
@@ -82,10 +81,7 @@ def all_matched(nodes: Sequence[Node]) -> bool:
 
 
 class NodeContext:
-    """Rig, ticker, measured pose and parameter overrides of a process, for its nodes.
-
-    As :class:`~endoscope_nodes.runtime.runtime.Runtime`, which is one, takes them.
-    """
+    """Rig, ticker, measured pose and parameter overrides of a process, for its nodes."""
 
     def __init__(
         self,

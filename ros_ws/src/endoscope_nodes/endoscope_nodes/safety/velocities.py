@@ -24,10 +24,7 @@ _VELOCITIES = (SLAVE_VELOCITY, TIP_VELOCITY)
 
 
 def rivals_in_motion(node: EndoscopeNode) -> str:
-    """Name all senders of positions and velocities; empty where there is but one, or the master.
-
-    The master's positions are made of the velocities of another sender.
-    """
+    """Name all senders of positions and velocities, if several besides the master."""
     if not any(map(node.count_publishers, _VELOCITIES)):
         return ''
     master = MASTER_NODE, node.get_namespace()
