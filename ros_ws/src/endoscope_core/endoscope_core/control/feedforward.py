@@ -103,11 +103,6 @@ class HysteresisInverse:
         """Nothing depends on it."""
 
 
-def parameters_of(mode: str) -> type[LawParameters]:
-    """Kind of parameters that a mode other than 'none' works with."""
-    return PhysicalParameters if mode in (PHYSICAL, ADAPTIVE_PHYSICAL) else MODELS[mode]
-
-
 @dataclass(frozen=True)
 class FeedforwardLaw:
     """What the compensator does with a desired angle.
@@ -131,7 +126,8 @@ class FeedforwardLaw:
             return
         if not self.parameters:
             raise ValueError(f'mode {self.mode!r} needs parameters for each joint: calibrate first')
-        kind = parameters_of(self.mode)
+        physical = self.mode in (PHYSICAL, ADAPTIVE_PHYSICAL)
+        kind = PhysicalParameters if physical else MODELS[self.mode]
         for given in self.parameters:
             if not isinstance(given, kind):
                 raise ValueError(

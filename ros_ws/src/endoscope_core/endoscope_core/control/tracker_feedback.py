@@ -195,9 +195,9 @@ class AdaptiveBacklashController:
             self._plays = [Play(0.5 * self.settings.dead_band, a) for a in ahead]
         foreseen = tuple(play.follow(a) for play, a in zip(self._plays, ahead, strict=True))
         if self._history:
-            last = self._history[-1]
+            last, travel = self._history[-1], self.settings.direction_travel
             direction = tuple(
-                direction_step(self.settings.direction_travel, s, new - old)
+                float(bouc_wen_normalised_step(s, new - old, travel, 0.0, 1.0))
                 for s, new, old in zip(last.direction, foreseen, last.foreseen, strict=True)
             )
         else:
@@ -248,11 +248,6 @@ class AdaptiveBacklashController:
         if len(numbers) != self._joints or not all(map(math.isfinite, numbers)):
             raise ValueError(f'{name} must be {self._joints} finite numbers, not {numbers}')
         return numbers
-
-
-def direction_step(travel: float, direction: float, delta: float) -> float:
-    """Direction memory in [-1, 1] after the desired angle has moved by `delta` rad."""
-    return float(bouc_wen_normalised_step(direction, delta, travel, 0.0, 1.0))
 
 
 class Corrections:

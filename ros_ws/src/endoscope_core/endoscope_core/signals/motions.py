@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from endoscope_core.errors import InputError
 from endoscope_core.signals.calibration_motion import (
     CALIBRATION_AMPLITUDE,
     calibration_sinusoid,
+    named,
 )
 from endoscope_core.signals.signal import FloatArray, Motion, Signal, hold, move, sequence, window
 
@@ -236,9 +235,4 @@ def motion_by_name(name: str) -> Motion:
 
     InputError if there is none of that name; the message names the nearest.
     """
-    if name not in MOTIONS:
-        near = difflib.get_close_matches(name, MOTIONS, n=1, cutoff=0.0)
-        raise InputError(
-            f'unknown motion {name!r}, nearest is {near[0]!r} (known: {", ".join(MOTIONS)})'
-        )
-    return MOTIONS[name]()
+    return named(name, MOTIONS, 'motion')()

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from endoscope_core.classifier.weights_file import load_classifier
+from endoscope_core.classifier.cnn_classifier import load_classifier
 from endoscope_core.control import FeedforwardLaw
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.hysteresis import MODELS

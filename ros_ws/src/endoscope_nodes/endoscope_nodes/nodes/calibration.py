@@ -22,7 +22,7 @@ from endoscope_core.classifier.classification import (
     ClassifierError,
     UnseenTensionError,
 )
-from endoscope_core.classifier.weights_file import load_classifier
+from endoscope_core.classifier.cnn_classifier import load_classifier
 from endoscope_core.control import MotorLimits
 from endoscope_core.judgement import Judgement, judged
 from endoscope_core.orders import Ending, Order, Orders, Pose
@@ -36,9 +36,8 @@ from endoscope_nodes.client.calibration_result import (
     successful_result,
 )
 from endoscope_nodes.client.graph_listener import feedback_message
-from endoscope_nodes.runtime.beside import Beside
 from endoscope_nodes.runtime.diagnostics import OK, Report
-from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.endoscope_node import Beside, EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
 from endoscope_nodes.runtime.node_parameters import CalibrationParameters
 from endoscope_nodes.runtime.parameters import ParameterError

@@ -13,8 +13,7 @@ from endoscope_core.control import AdoptedPlant, AdoptionError, adopted_plant
 from endoscope_core.safety import AdoptionCode
 from endoscope_nodes import names
 from endoscope_nodes.client.plant_adoption import AdoptionRequest, PlantInForce, Reach
-from endoscope_nodes.runtime.beside import Beside
-from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.endoscope_node import Beside, EndoscopeNode
 from endoscope_nodes.runtime.node_parameters import FOR_SESSION
 from endoscope_nodes.runtime.qos import EVENT, RESULT
 from endoscope_nodes.safety.sessions import SessionWatch

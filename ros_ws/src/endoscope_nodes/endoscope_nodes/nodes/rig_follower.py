@@ -15,8 +15,7 @@ from endoscope_bags.errors import BagError
 from endoscope_bags.joint_state_series import decode_joint_states
 from endoscope_nodes import names, topics
 from endoscope_nodes.client.plant_adoption import PlantInForce
-from endoscope_nodes.runtime.beside import Beside
-from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.endoscope_node import Beside, EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
 from endoscope_nodes.runtime.qos import RESULT, profile
 from endoscope_nodes.runtime.streams import RawSubscription
