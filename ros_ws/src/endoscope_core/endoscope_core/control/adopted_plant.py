@@ -96,13 +96,7 @@ def is_inverted(effect: Effect) -> bool:
 
 
 def adopted_plant(text: str, rig: Rig, joints: tuple[str, ...]) -> AdoptedPlant:
-    """Read a plant file of these joints and try its inverse; it takes some seconds.
-
-    Raises
-    ------
-    AdoptionError
-        If the text is no plant file, is of other joints, or cannot be inverted.
-    """
+    """Read a plant file and try its inverse, for some seconds; AdoptionError if that is no good."""
     plant = _read(text)
     if plant.joint_names() != joints:
         raise AdoptionError(

@@ -78,12 +78,7 @@ class JointParameters:
     qs and qs exp(s). Of the tension T of the wire on the inside of its bend the section lets
     T exp(-section_friction abs(q - section_straight_angle)) act where that wire is pulled, and
     T exp(+...) where it is let go. The wires are tightened at angle zero, where friction holds the
-    joint.
-
-    Raises
-    ------
-    ValueError
-        If a value is not finite, out of its bounds in physics, or the profile has too many terms.
+    joint. ValueError if a value is out of its bounds in physics, or the profile has too many terms.
     """
 
     # fmt: off
@@ -177,10 +172,7 @@ class JointParameters:
 class SensorParameters:
     """Noise (rms), resolution and rate of the sensors of the rig (SI units).
 
-    Raises
-    ------
-    ValueError
-        If a value is not finite, negative, or a rate or count is zero.
+    ValueError if a value is not finite, negative, or a rate or count is zero.
     """
 
     # fmt: off
@@ -236,53 +228,29 @@ NUMBERS: Mapping[str, PlantNumber] = {
 
 @dataclass(frozen=True)
 class EffectSpec:
-    """One physical effect added to the nominal plant.
+    """One physical effect added to the nominal plant."""
 
-    Attributes
-    ----------
-    id : str
-        Name in the catalogue of effects.
-    joint : str
-        The joint it acts on.
-    parameters : Mapping[str, float]
-        Parameters in SI units; those left out take the effect's typical value.
-    """
-
-    id: str
-    joint: str
+    id: str  # in the catalogue of effects
+    joint: str  # that it acts on
+    # In SI units; those left out take the effect's typical value.
     parameters: Mapping[str, Number] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class TermSpec:
-    """A function of one state added to the nominal plant where the catalogue has no effect.
+    """A function of one state added to the nominal plant where the catalogue has no effect."""
 
-    Attributes
-    ----------
-    joint : str
-        The joint it acts on.
-    place : str
-        Name in the table of places.
-    expression : str
-        Formula of the place's symbol, or nothing.
-    values : tuple of float
-        Instead of a formula: the function at equally spaced nodes over the range.
-    range : (float, float), optional
-        Of the argument; beyond it the function keeps its last value, or begins again. That of the
-        place if not given.
-    multiplies : bool
-        Whether it is no term of its own: what other functions add where this one acts is multiplied
-        by one plus this one. Both together are a function of two states.
-    lag_s : float, optional
-        Time constant in s of an argument that lags; that of the place if not given.
-    """
-
-    joint: str
-    place: str
-    expression: str = ''
-    values: tuple[float, ...] = ()
+    joint: str  # that it acts on
+    place: str  # in the table of places
+    expression: str = ''  # formula of the place's symbol, or nothing
+    values: tuple[float, ...] = ()  # instead: at equally spaced nodes over the range
+    # Of the argument, by default the place's; beyond it the function keeps its last value, or
+    # begins again.
     range: tuple[float, float] | None = None
+    # Whether it is no term of its own: what other functions add where this one acts is multiplied
+    # by one plus this one. Both together are a function of two states.
     multiplies: bool = False
+    # Time constant in s of an argument that lags, by default the place's.
     lag_s: float | None = None
 
 
