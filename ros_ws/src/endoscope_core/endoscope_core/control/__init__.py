@@ -6,11 +6,10 @@ from endoscope_core.control.adopted_plant import (
     AdoptedPlant,
     AdoptionError,
     adopted_plant,
-    plant_hash,
 )
 from endoscope_core.control.desired_motion import DesiredMotion
 from endoscope_core.control.feedforward import Feedforward, FeedforwardLaw, FeedforwardSettings
-from endoscope_core.control.handle import Handle, HandleRefusal, HandleSettings
+from endoscope_core.control.handle import Handle, HandleRefusal
 from endoscope_core.control.internal_model import PhysicalParameters, bending_range
 from endoscope_core.control.limits import MotorLimits
 from endoscope_core.control.physical_inverse import PhysicalInverse
@@ -35,7 +34,6 @@ __all__ = [
     'FeedforwardSettings',
     'Handle',
     'HandleRefusal',
-    'HandleSettings',
     'MotorLimits',
     'PhysicalInverse',
     'PhysicalParameters',
@@ -43,5 +41,4 @@ __all__ = [
     'TrackerMeasurement',
     'adopted_plant',
     'bending_range',
-    'plant_hash',
 ]

@@ -1,11 +1,10 @@
 """Parameters of hysteresis models from recordings."""
 
-from endoscope_core.identification.feedforward_fit import FeedforwardFit, Servo, fit_feedforward
-from endoscope_core.identification.hysteresis_fit import HysteresisRecording, ModelFit, fit_model
+from endoscope_core.identification.feedforward_fit import Servo, fit_feedforward
+from endoscope_core.identification.hysteresis_fit import HysteresisRecording, fit_model
 from endoscope_core.identification.plant_fit import PlantFit, PlantFitError, fit_plant
 from endoscope_core.identification.updated_table import (
     KINDS,
-    LawParameters,
     TableEntry,
     UpdatedTable,
     blend,
@@ -15,10 +14,7 @@ from endoscope_core.identification.updated_table import (
 
 __all__ = [
     'KINDS',
-    'FeedforwardFit',
     'HysteresisRecording',
-    'LawParameters',
-    'ModelFit',
     'PlantFit',
     'PlantFitError',
     'Servo',

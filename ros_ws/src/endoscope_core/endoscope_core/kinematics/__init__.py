@@ -1,9 +1,7 @@
 """From bending angles to the pose of the tip, and back; from a tracker's frame to the base's."""
 
 from endoscope_core.kinematics.constant_curvature import (
-    Hinge,
     TipVelocity,
-    Transform,
     Vertebrae,
     bending_from_orientation,
     bending_rate,
@@ -19,11 +17,9 @@ from endoscope_core.kinematics.straight_registration import (
 )
 
 __all__ = [
-    'Hinge',
     'RegistrationError',
     'StraightRegistration',
     'TipVelocity',
-    'Transform',
     'Vertebrae',
     'bending_from_orientation',
     'bending_rate',

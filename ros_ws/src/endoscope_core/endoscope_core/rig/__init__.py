@@ -1,17 +1,11 @@
 """The rig: gears, limits, time-outs and devices, defined once for all nodes."""
 
 from endoscope_core.rig.facts import (
-    DeviceFacts,
-    HandleFacts,
     InstrumentFacts,
-    JointFacts,
     Kind,
     MotorFacts,
     Rig,
     RigKind,
-    SimulationFacts,
-    Timeouts,
-    TipFacts,
     digest,
     kind_from_text,
     kind_of_several,
@@ -22,17 +16,11 @@ from endoscope_core.rig.facts import (
 )
 
 __all__ = [
-    'DeviceFacts',
-    'HandleFacts',
     'InstrumentFacts',
-    'JointFacts',
     'Kind',
     'MotorFacts',
     'Rig',
     'RigKind',
-    'SimulationFacts',
-    'Timeouts',
-    'TipFacts',
     'digest',
     'kind_from_text',
     'kind_of_several',
