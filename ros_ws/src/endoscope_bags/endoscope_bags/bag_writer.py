@@ -13,12 +13,7 @@ from endoscope_bags.chunk_sink import ChunkSink, TopicRecord, write_error
 from endoscope_bags.errors import BagExistsError, BagWriteError, MalformedMessageError
 from endoscope_bags.mcap_file import MESSAGE_OVERHEAD, ChunkMessage, chunk_message
 from endoscope_bags.message_types import MessageType, message_type
-from endoscope_bags.metadata import (
-    METADATA,
-    TopicSummary,
-    metadata_document,
-    metadata_text,
-)
+from endoscope_bags.metadata import METADATA, TopicSummary, metadata_document, metadata_text
 from endoscope_bags.topic import QosProfile
 from endoscope_core.atomic_output import make_parent, write_text
 

@@ -10,12 +10,7 @@ import numpy.typing as npt
 from rosbags.serde import SerdeError
 
 from endoscope_bags.cdr import HEAD_WITH_STAMP, QUANTITIES, Payloads, stamps_of_heads
-from endoscope_bags.errors import (
-    BagError,
-    CorruptBagError,
-    MalformedMessageError,
-    UnknownTypeError,
-)
+from endoscope_bags.errors import BagError, CorruptBagError, MalformedMessageError, UnknownTypeError
 from endoscope_bags.joint_state_series import (
     JointStateSeries,
     PoseSeries,

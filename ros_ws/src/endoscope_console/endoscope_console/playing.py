@@ -54,7 +54,8 @@ class HandlePlace:
     async def take(self, take: bool) -> None:
         """Become the publisher of the handle topics, and have the master follow them."""
         graph = self._graph
-        settings = graph.settings = await self._ask(self._read_settings)
+        found = await self._ask(partial(self.read_master, 'source', 'scale'))
+        settings = graph.settings = Settings(**found)
         if graph.plays and not take:
             raise EndoscopeError(
                 f'the master plays (its source is {settings.source}): taking the controls would '
@@ -83,9 +84,6 @@ class HandlePlace:
         self._found = settings.source
         graph.settings = Settings(FOLLOW_THE_HANDLE, settings.scale)
         self.publishes = True
-
-    def _read_settings(self) -> Settings:
-        return Settings(**self.read_master('source', 'scale'))
 
     def read_master(self, *names: str) -> dict[str, Any]:
         """Values of the master's parameters."""

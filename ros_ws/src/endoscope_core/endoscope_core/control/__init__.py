@@ -2,11 +2,7 @@
 
 from endoscope_core.choices import ADAPTIVE_PHYSICAL, MODES
 from endoscope_core.control.adaptive_backlash import AdaptiveBacklashSettings
-from endoscope_core.control.adopted_plant import (
-    AdoptedPlant,
-    AdoptionError,
-    adopted_plant,
-)
+from endoscope_core.control.adopted_plant import AdoptedPlant, AdoptionError, adopted_plant
 from endoscope_core.control.desired_motion import DesiredMotion
 from endoscope_core.control.feedforward import Feedforward, FeedforwardLaw, FeedforwardSettings
 from endoscope_core.control.handle import Handle, HandleRefusal

@@ -12,13 +12,7 @@ from numpy.typing import NDArray
 
 from endoscope_core.choices import ADAPTIVE_PHYSICAL, MODES, PHYSICAL
 from endoscope_core.control.internal_model import PhysicalParameters
-from endoscope_core.control.limits import (
-    COUNT,
-    MotorLimits,
-    Play,
-    limited,
-    worked_off,
-)
+from endoscope_core.control.limits import COUNT, MotorLimits, Play, limited, worked_off
 from endoscope_core.control.physical_inverse import AdaptivePhysicalInverse, PhysicalInverse
 from endoscope_core.hysteresis import MODELS, HysteresisParameters
 from endoscope_core.hysteresis.dahl import dahl_step

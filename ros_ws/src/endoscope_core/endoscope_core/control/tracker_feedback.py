@@ -11,10 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.control.adaptive_backlash import (
-    AdaptiveBacklashJoint,
-    AdaptiveBacklashSettings,
-)
+from endoscope_core.control.adaptive_backlash import AdaptiveBacklashJoint, AdaptiveBacklashSettings
 from endoscope_core.control.limits import SHARE_OF_TRAVEL, Play, limited, worked_off
 from endoscope_core.hysteresis.bouc_wen import bouc_wen_normalised_step
 

@@ -9,11 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.monitoring.jump_test import Jumps, JumpTest, ResidualBlock
-from endoscope_core.monitoring.prediction import (
-    JOINT_TICK_S,
-    SERVO_TICK_S,
-    PredictionBank,
-)
+from endoscope_core.monitoring.prediction import JOINT_TICK_S, SERVO_TICK_S, PredictionBank
 from endoscope_core.monitoring.rig_change import CHANGES, DIRECTIONS, DRIFT_S, SMALLEST, Part
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.signals.samples import Samples

@@ -254,11 +254,6 @@ class TermSpec:
     lag_s: float | None = None
 
 
-def joints_of_slave() -> dict[str, JointParameters]:
-    """Both joints of the simulated slave."""
-    return {'bend_x': SLAVE, 'bend_y': SLAVE}
-
-
 @dataclass(frozen=True)
 class PlantDescription:
     """A whole rig: its joints in order, its sensors, and the physics added to the nominal plant.
@@ -266,7 +261,10 @@ class PlantDescription:
     `effects` are of the catalogue, `terms` are functions where it has none.
     """
 
-    joints: Mapping[str, JointParameters] = field(default_factory=joints_of_slave)
+    # By default both of the simulated slave.
+    joints: Mapping[str, JointParameters] = field(
+        default_factory=lambda: {'bend_x': SLAVE, 'bend_y': SLAVE}
+    )
     sensors: SensorParameters = field(default_factory=SensorParameters)
     effects: tuple[EffectSpec, ...] = ()
     terms: tuple[TermSpec, ...] = ()
@@ -297,6 +295,6 @@ def _check_numbers(parameters: JointParameters | SensorParameters) -> None:
             raise ValueError(f'{key} is {value}: it must be positive')
 
 
-SLAVE = JointParameters(joint_friction=5.0e-4, section_friction=0.3)
+SLAVE: JointParameters = JointParameters(joint_friction=5.0e-4, section_friction=0.3)
 """A joint of the simulated slave: some of its friction grows with the bend, as on the real
 endoscope. A joint of which nothing is said has none of that."""

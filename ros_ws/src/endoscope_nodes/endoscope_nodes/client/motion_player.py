@@ -16,11 +16,7 @@ from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import MASTER, PATIENCE_S, RECORDER, GraphError
 from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
 from endoscope_nodes.client.handle_sender import clutch_message
-from endoscope_nodes.client.plant_adoption import (
-    AdoptedPlants,
-    RefusedAdoptionError,
-    plant_text,
-)
+from endoscope_nodes.client.plant_adoption import AdoptedPlants, RefusedAdoptionError, plant_text
 from endoscope_nodes.runtime.node_parameters import FOR_SESSION
 from endoscope_nodes.runtime.qos import EVENT
 

@@ -17,11 +17,7 @@ from endoscope_core.calibration.calibration_run import (
     OrderFeedback,
     OrderState,
 )
-from endoscope_core.classifier.classification import (
-    Classifier,
-    ClassifierError,
-    UnseenTensionError,
-)
+from endoscope_core.classifier.classification import Classifier, ClassifierError, UnseenTensionError
 from endoscope_core.classifier.cnn_classifier import load_classifier
 from endoscope_core.control import MotorLimits
 from endoscope_core.judgement import Judgement, judged

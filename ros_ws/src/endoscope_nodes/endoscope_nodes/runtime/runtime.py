@@ -26,10 +26,7 @@ from endoscope_core.exit_status import ClosedOnExit
 from endoscope_core.rig import Rig
 from endoscope_nodes.runtime.declared_parameters import check_overrides
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
-from endoscope_nodes.runtime.environment import (
-    log_as_asked,
-    stay_on_this_machine,
-)
+from endoscope_nodes.runtime.environment import log_as_asked, stay_on_this_machine
 from endoscope_nodes.runtime.node_context import NodeContext, all_matched
 from endoscope_nodes.runtime.parameters import ParameterError, as_typed
 from endoscope_nodes.runtime.real_time import (

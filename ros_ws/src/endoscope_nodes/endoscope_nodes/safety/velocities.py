@@ -7,13 +7,7 @@ from geometry_msgs.msg import TwistStamped
 from endoscope_core.control.velocity_stream import VelocityStream
 from endoscope_core.kinematics import TipVelocity
 from endoscope_core.safety import Refusal
-from endoscope_nodes.names import (
-    JOINTS,
-    MASTER_NODE,
-    SLAVE_COMMAND,
-    SLAVE_VELOCITY,
-    TIP_VELOCITY,
-)
+from endoscope_nodes.names import JOINTS, MASTER_NODE, SLAVE_COMMAND, SLAVE_VELOCITY, TIP_VELOCITY
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.qos import COMMAND
