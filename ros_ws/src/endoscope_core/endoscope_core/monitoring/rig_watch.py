@@ -11,20 +11,9 @@ from numpy.typing import NDArray
 from endoscope_core.monitoring.jump_test import Jumps, JumpTest, ResidualBlock
 from endoscope_core.monitoring.prediction import JOINT_TICK_S, SERVO_TICK_S, PredictionBank
 from endoscope_core.monitoring.rig_change import CHANGES, DIRECTIONS, DRIFT_S, SMALLEST, Part
+from endoscope_core.monitoring.thresholds import THRESHOLDS
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.signals.samples import Samples
-
-THRESHOLDS = {
-    'cell': 56.5,  # largest seen: 47.7
-    'tracker': 198.0,  # largest seen: 71.2
-    'wire': 42.6,  # largest seen: 17.7
-    'sheath': 37.0,  # largest seen: 15.8
-    'joint': 145.0,  # largest seen: 96.3
-    'actuator': 19.0,  # largest seen: 19
-}
-FALSE_ALARMS_PER_HOUR = 0.1
-"""Of motion, for which they are derived."""
-
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from endoscope_core.monitoring import Part, RigWatch
-from endoscope_core.monitoring.rig_watch import BLOCK_S, THRESHOLDS
+from endoscope_core.monitoring.rig_watch import BLOCK_S
+from endoscope_core.monitoring.thresholds import THRESHOLDS
 from endoscope_core.physics import EffectSpec, PlantDescription, SensorModel, layout
 from endoscope_core.physics.effects import describe
 from endoscope_core.physics.kernel import run_joints

@@ -10,7 +10,7 @@ from scipy.stats import gumbel_r
 
 from endoscope_core.atomic_output import write_text
 from endoscope_core.monitoring import Part
-from endoscope_core.monitoring.rig_watch import THRESHOLDS
+from endoscope_core.monitoring.thresholds import THRESHOLDS
 from endoscope_lab.bench import (
     chosen,
     keep_row,

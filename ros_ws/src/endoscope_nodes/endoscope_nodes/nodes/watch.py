@@ -9,7 +9,8 @@ from threadpoolctl import threadpool_limits
 
 from endoscope_core.errors import FileError
 from endoscope_core.monitoring import DetectedChange, RigWatch
-from endoscope_core.monitoring.rig_watch import BLOCK_S, FALSE_ALARMS_PER_HOUR, LEARNT, WINDOWS
+from endoscope_core.monitoring.rig_watch import BLOCK_S, LEARNT, WINDOWS
+from endoscope_core.monitoring.thresholds import FALSE_ALARMS_PER_HOUR
 from endoscope_core.physics import PlantDescription
 from endoscope_nodes import names
 from endoscope_nodes.nodes.rig_follower import STREAMS, RigFollower
