@@ -228,7 +228,7 @@ NUMBERS: Mapping[str, PlantNumber] = {
 
 @dataclass(frozen=True)
 class EffectSpec:
-    """One physical effect added to the nominal plant."""
+    """One physical effect added to the nominal plant, its parameters in SI units."""
 
     id: str  # in the catalogue of effects
     joint: str  # that it acts on

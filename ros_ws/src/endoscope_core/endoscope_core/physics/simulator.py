@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PlantSample:
-    """What the noise-free sensors read at one instant, for J joints."""
+    """What the noise-free sensors read at one instant, for J joints: s, rad, rad/s, N m and N."""
 
     time: float  # s since the start
     # Of the motor, (J,), in rad, rad/s and N m.
