@@ -11,7 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.errors import InputError, nearest
-from endoscope_core.physics.effect import Effect, NominalPhysics, Symptom, in_order_of_chain
+from endoscope_core.physics.effect import (
+    Effect,
+    NominalPhysics,
+    Symptom,
+    in_order_of_chain,
+)
 
 for _module in sorted(module.name for module in pkgutil.iter_modules(__path__)):
     importlib.import_module(f'{__name__}.{_module}')
