@@ -1,7 +1,7 @@
 """A recording of a joint that counts, and what an error has to be like."""
 
 from endoscope_bags import BagWriter
-from endoscope_bags.cdr_encoding import encode_joint_state
+from endoscope_bags.cdr import encode_joint_state
 from endoscope_bags.message_types import JOINT_STATE
 
 MS = 10**6

@@ -11,7 +11,7 @@ from rclpy.context import Context
 from sensor_msgs.msg import JointState, Joy
 from std_msgs.msg import Header, String
 
-from endoscope_bags.cdr_encoding import encode_joint_state, encode_poses
+from endoscope_bags.cdr import encode_joint_state, encode_poses
 from endoscope_bags.message_types import TF_MESSAGE
 from endoscope_core.rig import shipped_rig
 from endoscope_nodes.nodes.instrument_model import JointTransforms, section_of

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_bags import BagWriter, MessageStream
-from endoscope_bags.cdr_encoding import encode_joint_states
+from endoscope_bags.cdr import encode_joint_states
 from endoscope_core.physics import (
     EffectSpec,
     JointParameters,

@@ -26,7 +26,7 @@ from endoscope_devices.em_tracker import (
     save_registration,
 )
 from endoscope_devices.em_tracker.aurora_port import AuroraPort, TrackerReplyError
-from endoscope_devices.em_tracker.pose_check import TURN_NOISE, TURN_RATE
+from endoscope_devices.em_tracker.aurora_tracker import TURN_NOISE, TURN_RATE
 from endoscope_devices.em_tracker.tx_reply import MalformedReplyError, parse_tx
 from endoscope_emulators.aurora import AuroraEmulator
 from endoscope_emulators.aurora_unit import SensorView, sealed

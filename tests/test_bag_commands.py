@@ -6,7 +6,7 @@ import re
 import pytest
 
 from endoscope_bags import BagWriter, open_bag
-from endoscope_bags.cdr_encoding import encode_string
+from endoscope_bags.cdr import encode_string
 from endoscope_bags.event_bag import FAULT, MARK, EventBag, new_event_bag
 from endoscope_bags.message_types import STRING
 from endoscope_bags.recent_messages import RecentMessages

@@ -13,7 +13,7 @@ from short_bags import PLANT, write_short_bag
 from endoscope_bags import open_bag
 from endoscope_console.explanations import EXPERIMENT_FILE, REPORT_FILE
 from endoscope_core.physics import PlantDescription, save_plant
-from endoscope_core.signals.command_file import write_command_file
+from endoscope_core.signals.sampled_motion import write_command_file
 from endoscope_explain.investigation.log import COMMISSIONING, Round, Stop, begun
 from endoscope_nodes.names import SLAVE_COMMAND
 

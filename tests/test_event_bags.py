@@ -14,9 +14,9 @@ from simulated_graph import SimulatedGraph
 from std_msgs.msg import Header, String
 
 from endoscope_bags import open_bag
-from endoscope_bags.cdr_encoding import encode_joint_state
+from endoscope_bags.cdr import encode_joint_state
 from endoscope_bags.event_bag import event_bags, events_of
-from endoscope_bags.rig_kind import kind_of_bag
+from endoscope_bags.recording import kind_of_bag
 from endoscope_bringup.cli import main
 from endoscope_core.rig import Kind
 from endoscope_nodes.names import MOTION_SESSION, MOTOR_MEASURED, RECORDER_MARK

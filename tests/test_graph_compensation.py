@@ -9,7 +9,7 @@ from endoscope_core.control import MODES
 from endoscope_core.identification.law_choice import CalibrationFindings
 from endoscope_core.metrics import tracking_rmse
 from endoscope_core.signals import periodic_signal
-from endoscope_core.signals.command_file import write_command_file
+from endoscope_core.signals.sampled_motion import write_command_file
 
 SIGNAL = periodic_signal(2.5 * np.pi).scaled(0.7)
 

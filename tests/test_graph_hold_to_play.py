@@ -5,7 +5,7 @@ import pytest
 from commanded_graph import BOUND, STILL, TICK_RATE, Moved, run
 from sensor_msgs.msg import Joy
 
-from endoscope_core.signals.command_file import write_command_file
+from endoscope_core.signals.sampled_motion import write_command_file
 from endoscope_nodes.names import MASTER_CLUTCH
 from endoscope_nodes.nodes.master import WAITING
 from endoscope_nodes.runtime.qos import EVENT

@@ -22,7 +22,7 @@ from endoscope_core.physics import EffectSpec, PlantDescription, TermSpec, load_
 from endoscope_core.physics.description import NUMBERS
 from endoscope_core.rig import load_rig
 from endoscope_core.rig.facts import SHIPPED
-from endoscope_core.signals.command_file import read_command_file, write_command_file
+from endoscope_core.signals.sampled_motion import read_command_file, write_command_file
 from endoscope_devices.load_cells import load_calibration
 from endoscope_nodes.names import WIRES
 

@@ -13,13 +13,12 @@ from counted_bag import N, says_one_line, write_bag
 from mcap.writer import Writer
 
 from endoscope_bags import BagError, BagWriter, open_bag
-from endoscope_bags.cdr_encoding import encode_joint_state, encode_string
+from endoscope_bags.cdr import encode_joint_state, encode_string
 from endoscope_bags.copying import recover
 from endoscope_bags.errors import MalformedMessageError
 from endoscope_bags.information import bag_information
-from endoscope_bags.mcap_records import MAGIC
+from endoscope_bags.mcap_records import LARGEST_CHUNK, MAGIC
 from endoscope_bags.message_types import JOINT_STATE, STRING
-from endoscope_bags.unpacking import LARGEST_CHUNK
 from endoscope_bringup.cli import main
 
 CHUNK, CHANNEL, MESSAGE, DATA_END, FOOTER = 6, 4, 5, 15, 2

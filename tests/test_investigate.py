@@ -16,7 +16,7 @@ from endoscope_core.names import JOINTS
 from endoscope_core.physics import EffectSpec, PlantDescription, save_plant
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import hold, move, sequence
-from endoscope_core.signals.command_file import CommandTable, write_command_file
+from endoscope_core.signals.sampled_motion import CommandTable, write_command_file
 from endoscope_explain.investigation import motions
 from endoscope_explain.investigation.motions import RigMotion, held_out, tracked
 from endoscope_nodes.client.graph_parameters import read_parameter

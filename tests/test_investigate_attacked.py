@@ -19,7 +19,7 @@ from endoscope_core.errors import NotPlayedError, RigStoppedError
 from endoscope_core.names import JOINTS
 from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.signals import hold, move, sequence
-from endoscope_core.signals.command_file import CommandTable, write_command_file
+from endoscope_core.signals.sampled_motion import CommandTable, write_command_file
 from endoscope_explain.investigation.motions import RigMotion
 from endoscope_nodes.client import motion_player
 from endoscope_nodes.client.graph_client import GraphClient

@@ -13,8 +13,7 @@ from load_cell_rig import BROKEN, ZERO, Cells, transmitter, write_calibration
 from endoscope_devices.load_cells import load_calibration, modbus_rtu, modbus_tcp
 from endoscope_devices.load_cells.calibration_file import SerialSettings
 from endoscope_devices.load_cells.modbus_framing import ReplyError, RtuFraming
-from endoscope_devices.load_cells.modbus_line import SerialLine
-from endoscope_devices.load_cells.register_reader import RegisterReader
+from endoscope_devices.load_cells.modbus_line import RegisterReader, SerialLine
 from endoscope_emulators.cables.serial_cable import SerialCable
 from endoscope_emulators.cables.tcp_cable import TcpCable
 from endoscope_nodes.names import WIRES

@@ -20,7 +20,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from endoscope_bags import open_bag
-from endoscope_bags.cdr_encoding import encode_clock, encode_joint_state, encode_string
+from endoscope_bags.cdr import encode_clock, encode_joint_state, encode_string
 from endoscope_bags.message_types import message_type
 from endoscope_bags.recorder import new_bag
 from endoscope_nodes.runtime.diagnostics import OK

@@ -17,7 +17,7 @@ from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import JointState
 
 from endoscope_bags import BagWriter, open_bag
-from endoscope_bags.cdr_encoding import encode_joint_state
+from endoscope_bags.cdr import encode_joint_state
 from endoscope_bags.copying import recover
 from endoscope_bags.errors import CorruptBagError
 from endoscope_bags.information import bag_information

@@ -8,7 +8,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 from endoscope_bags import BagWriter, open_bag
-from endoscope_bags.cdr_encoding import encode_joint_state, encode_string
+from endoscope_bags.cdr import encode_joint_state, encode_string
 from endoscope_bags.message_types import JOINT_STATE, STRING
 from endoscope_bags.topic import COMMAND_QOS, LATCHED_QOS
 from endoscope_nodes.nodes.replay import ReplayNode

@@ -6,10 +6,9 @@ import pytest
 from simulated_graph import SimulatedGraph
 
 from endoscope_bags import BagWriter, open_bag
-from endoscope_bags.cdr_encoding import encode_string
+from endoscope_bags.cdr import encode_string
 from endoscope_bags.message_types import STRING
-from endoscope_bags.recording import rig_of_bag
-from endoscope_bags.rig_kind import kind_of_bag
+from endoscope_bags.recording import kind_of_bag, rig_of_bag
 from endoscope_bringup.cli import main
 from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.physics.plant_file import plant_as_text

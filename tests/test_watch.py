@@ -12,11 +12,11 @@ from simulated_graph import SimulatedGraph
 from std_srvs.srv import Trigger
 
 from endoscope_bags import open_bag
-from endoscope_bags.cdr_encoding import encode_joint_state
+from endoscope_bags.cdr import encode_joint_state
 from endoscope_bags.event_bag import event_bags, events_of
 from endoscope_bringup.operating.status import status_of
 from endoscope_core.physics import EffectSpec, PlantDescription, save_plant
-from endoscope_core.signals.command_file import write_command_file
+from endoscope_core.signals.sampled_motion import write_command_file
 from endoscope_explain.recording import recording_from_bag
 from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.graph import ALL_NODES

@@ -13,12 +13,7 @@ from endoscope_bags.chunk_sink import ChunkSink, TopicRecord, write_error
 from endoscope_bags.errors import BagExistsError, BagWriteError, MalformedMessageError
 from endoscope_bags.mcap_file import MESSAGE_OVERHEAD, ChunkMessage, chunk_message
 from endoscope_bags.message_types import MessageType, message_type
-from endoscope_bags.metadata import (
-    METADATA,
-    TopicSummary,
-    metadata_document,
-    metadata_text,
-)
+from endoscope_bags.metadata import METADATA, TopicSummary, metadata_document, metadata_text
 from endoscope_bags.topic import QosProfile
 from endoscope_core.atomic_output import make_parent, write_text
 
@@ -29,25 +24,13 @@ METADATA_RECORD = 'endoscope_bags'
 
 @dataclass(frozen=True)
 class MessageStream:
-    """N encoded messages of one topic, for `BagWriter.write_streams`.
+    """N encoded messages of one topic, for `BagWriter.write_streams`; times in ns."""
 
-    Attributes
-    ----------
-    topic, type
-        Full topic name and message type.
-    payloads
-        The encoded messages.
-    log_ns
-        Receipt in ns since the epoch, int64, shape (N,).
-    publish_ns
-        Publication, the same; None where it equals receipt.
-    """
-
-    topic: str
+    topic: str  # full name
     type: str
     payloads: Sequence[bytes]
-    log_ns: npt.NDArray[np.int64]
-    publish_ns: npt.NDArray[np.int64] | None = None
+    log_ns: npt.NDArray[np.int64]  # receipt since the epoch, (N,)
+    publish_ns: npt.NDArray[np.int64] | None = None  # None where it equals receipt
 
     def __post_init__(self) -> None:
         for times in (self.log_ns, self.published_ns):
@@ -66,38 +49,14 @@ class MessageStream:
 class BagWriter:
     """Writes one recording: a rosbag2 folder, or a bare file where the name ends in ``.mcap``.
 
-    A chunk spans at most a quarter of a second of receipt: a killed writer loses little, and
-    a threaded one keeps its process waiting for the interpreter for less than a millisecond. Use it
-    as a context manager: on an exception an atomic writer leaves nothing behind, another finishes
-    what it has.
+    A chunk spans at most `chunk_seconds` of receipt or `chunk_bytes`: a killed writer loses little,
+    and a `threaded` one, for callers that must not stall, keeps its process waiting for the
+    interpreter for less than a millisecond. As a context manager, on an exception an `atomic`
+    writer, which takes its name on closing, leaves nothing behind; another finishes what it has,
+    for what recorders leave when they are killed must be found. `records` are metadata records by
+    name, which stand before all messages.
 
-    Parameters
-    ----------
-    path
-        Folder ``NAME`` (holding ``NAME_0.mcap`` and ``metadata.yaml``) or file ``NAME.mcap``.
-    atomic
-        Write under a temporary name and take the final one on closing. Recorders do without: what
-        they leave when they are killed must be found.
-    chunk_seconds, chunk_bytes
-        A chunk is closed when it spans this time or exceeds this size, whatever comes first.
-    threaded
-        Compress and write chunks in a thread, for callers that must not stall.
-    records
-        Metadata records by name, which stand before all messages: a recording that is cut off has
-        them.
-
-    Attributes
-    ----------
-    closed, finished
-        Whether `close` or `discard` was called, and whether the recording is complete with its
-        summary and metadata.
-
-    Raises
-    ------
-    BagExistsError
-        Something is there already.
-    BagWriteError
-        The place cannot be written to, or not even the beginning fits.
+    BagExistsError if something is there already; BagWriteError if not even the beginning fits.
     """
 
     def __init__(
@@ -113,8 +72,8 @@ class BagWriter:
         self.path = Path(path)
         if self.path.exists() or self.path.is_symlink():
             raise BagExistsError(f'{self.path}: exists already; recordings are never overwritten')
-        self.closed = False
-        self.finished = False
+        self.closed = False  # by `close` or `discard`
+        self.finished = False  # complete with its summary and metadata
         self._bare = self.path.suffix == '.mcap'
         self._file_name = self.path.name if self._bare else f'{self.path.name}_0.mcap'
         self._chunk_ns = round(chunk_seconds * 1e9)
@@ -166,21 +125,9 @@ class BagWriter:
     def add_topic(
         self, topic: str, kind: str | MessageType, qos: Sequence[QosProfile] = ()
     ) -> None:
-        """Announce a topic; one without messages is listed, too. Again is harmless.
+        """Announce a topic, with what its publishers offer; again is harmless.
 
-        Parameters
-        ----------
-        topic
-            Full name.
-        kind
-            Name of the message type, or the type with its definition.
-        qos
-            What its publishers offer.
-
-        Raises
-        ------
-        UnknownTypeError
-            The definition of the type is nowhere to be found.
+        UnknownTypeError if `kind` is the name of a type that is defined nowhere.
         """
         if topic in self._topics:
             return
@@ -199,25 +146,11 @@ class BagWriter:
         publish_ns: int | None = None,
         sequence: int = 0,
     ) -> None:
-        """Add one encoded message.
+        """Add one message in CDR, received and published (by default then) at ns since the epoch.
 
-        Parameters
-        ----------
-        topic, type_name
-            Full topic name and message type; the topic is announced if it was not.
-        cdr
-            The message in CDR.
-        log_ns, publish_ns
-            Receipt and publication, ns since the epoch; publication defaults to receipt.
-        sequence
-            The publisher's message counter (modulo 2**32).
-
-        Raises
-        ------
-        BagWriteError
-            The disk is full; the chunks before are kept. Close the writer.
-        MalformedMessageError
-            A time is negative.
+        The topic is announced if it was not; `sequence` is the publisher's counter modulo 2**32.
+        BagWriteError if the disk is full, with the chunks before kept: close the writer then.
+        MalformedMessageError if a time is negative.
         """
         published = log_ns if publish_ns is None else publish_ns
         if log_ns < 0 or published < 0:
@@ -241,11 +174,7 @@ class BagWriter:
         """Add whole topics, merged by receipt (equal ones in the order of `streams`).
 
         The sequence counts from 1 in each topic, as a publisher does, on from call to call.
-
-        Raises
-        ------
-        BagWriteError
-            The disk is full.
+        BagWriteError if the disk is full.
         """
         if not streams:
             return
@@ -272,11 +201,8 @@ class BagWriter:
     def flush(self) -> None:
         """Close the chunk in progress and hand it to the operating system.
 
-        Raises
-        ------
-        BagWriteError
-            This chunk or, when threaded, one before did not fit on the disk; its messages are
-            dropped and no longer counted.
+        BagWriteError if it or, when threaded, one before did not fit on the disk; its messages are
+        dropped and no longer counted.
         """
         pending, self._pending = self._pending, []
         topics, self._new_topics = self._new_topics, []
@@ -285,31 +211,17 @@ class BagWriter:
             self._sink.write(topics, pending, size)
 
     def settle(self) -> None:
-        """Flush, and wait until everything is in the file or did not fit.
-
-        Raises
-        ------
-        BagWriteError
-            As in `flush`, for every chunk so far.
-        """
+        """Flush, and wait until everything is in the file; BagWriteError as in `flush`."""
         try:
             self.flush()
         finally:
             self._sink.wait()
 
     def close(self, custom_data: Mapping[str, str] | None = None) -> None:
-        """Finish the recording; harmless when it is closed already.
+        """Finish the recording, with free text for its metadata; harmless when that is done.
 
-        Parameters
-        ----------
-        custom_data
-            Free text that goes into `metadata.yaml` and into a metadata record of the file.
-
-        Raises
-        ------
-        BagWriteError
-            The last chunk, or the index, did not fit. The recording is finished all the same in
-            the first case, and can be recovered in the second.
+        BagWriteError if the last chunk did not fit, and the recording is finished all the same, or
+        the index did not, and it can be recovered.
         """
         if self.closed:
             return

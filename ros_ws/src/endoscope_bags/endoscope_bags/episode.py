@@ -94,13 +94,7 @@ class Channels:
 
     @property
     def tracker_rate(self) -> int:
-        """Rate in Hz at which the bending angle was measured.
-
-        Raises
-        ------
-        BagError
-            It was not recorded, or less than once a second.
-        """
+        """Rate in Hz of the bending angle; BagError where it has none of one Hz or more."""
         state = [c for c in self.channels if c.source.feature == STATE]
         rate = round(1e9 / state[0].period_ns) if state else 0
         if not rate:
@@ -121,13 +115,7 @@ class Episode:
 
 
 def channels_of(bag: Recording, namespace: str | None = None) -> Channels:
-    """Return the channels of a recording.
-
-    Raises
-    ------
-    BagError
-        It has no command, or a channel holds what is not finite or of another type.
-    """
+    """Channels of a recording; BagError without a command, or for what is not finite."""
     asked = [s for s in ACTIONS if bag.has(s.topic, namespace)]
     if not asked:
         raise BagError(bag.lacking(*(s.topic for s in ACTIONS), namespace=namespace))
@@ -182,13 +170,7 @@ def _forces(bag: Recording, topic: str) -> tuple[tuple[str, ...], IntArray, Floa
 
 
 def episodes_of(recorded: Channels, fps: int) -> list[Episode]:
-    """Return the episodes of a recording at `fps` frames a second.
-
-    Raises
-    ------
-    BagError
-        No second of it has all channels.
-    """
+    """Episodes at `fps` frames a second; BagError where no second has all channels."""
     measured = [c for c in recorded.channels if not c.source.held]
     first = max(int(c.stamp_ns[0]) for c in recorded.channels)
     last = min((int(c.stamp_ns[-1]) for c in measured), default=0)

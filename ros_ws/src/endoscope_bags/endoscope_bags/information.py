@@ -10,8 +10,7 @@ import numpy.typing as npt
 from endoscope_bags.bag_writer import METADATA_RECORD
 from endoscope_bags.chunk_sink import LIBRARY
 from endoscope_bags.message_types import begins_with_header
-from endoscope_bags.recording import Recording
-from endoscope_bags.rig_kind import kind_of_bag
+from endoscope_bags.recording import Recording, kind_of_bag
 from endoscope_bags.sequence_gaps import SequenceGaps
 from endoscope_core.errors import printable
 from endoscope_core.rig import RigKind

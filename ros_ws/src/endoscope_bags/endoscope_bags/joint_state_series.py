@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from endoscope_bags.cdr_decoding import (
+from endoscope_bags.cdr import (
     QUANTITIES,
     Layout,
     LayoutGroup,
@@ -31,27 +31,17 @@ IntArray = npt.NDArray[np.int64]
 class JointStateSeries:
     """N messages of `sensor_msgs/msg/JointState` with J joints.
 
-    Attributes
-    ----------
-    topic
-        Full name of the topic.
-    names
-        Joint names in the order in which they first appear, length J.
-    stamp_ns, log_ns, publish_ns
-        Header stamp, receipt and publication in ns since the epoch, int64, shape (N,).
-    sequence
-        The writer's message counter, shape (N,).
-    position, velocity, effort
-        Shape (N, J) in rad, rad/s, N m (N for wires); None where no message has the quantity, NaN
-        where some lack it.
+    Times are int64 in ns since the epoch; quantities are (N, J) in rad, rad/s and N m (N for
+    wires), None where no message has them, NaN where some lack them.
     """
 
-    topic: str
-    names: tuple[str, ...]
+    topic: str  # full name
+    names: tuple[str, ...]  # of joints, in the order in which they first appear
+    # Header stamp, receipt and publication, (N,).
     stamp_ns: IntArray
     log_ns: IntArray
     publish_ns: IntArray
-    sequence: IntArray
+    sequence: IntArray  # (N,), the writer's message counter
     position: FloatArray | None
     velocity: FloatArray | None
     effort: FloatArray | None
@@ -81,13 +71,7 @@ class JointStateSeries:
         )
 
     def select(self, names: Sequence[str]) -> 'JointStateSeries':
-        """Return the series with the joints `names` only, in that order.
-
-        Raises
-        ------
-        BagError
-            A joint is not in the recording.
-        """
+        """The series with the joints `names` only, in that order; BagError if one is not there."""
         missing = [name for name in names if name not in self.names]
         if missing:
             raise BagError(
@@ -104,26 +88,14 @@ class JointStateSeries:
         )
 
     def require(self, quantity: str) -> FloatArray:
-        """Return `position`, `velocity` or `effort`.
-
-        Raises
-        ------
-        BagError
-            No message has the quantity.
-        """
+        """`position`, `velocity` or `effort`; BagError if no message has it."""
         values: FloatArray | None = getattr(self, quantity)
         if values is None:
             raise BagError(f'topic {self.topic} has no {quantity}')
         return values
 
     def check_finite(self, quantities: Sequence[str] = QUANTITIES) -> None:
-        """Refuse NaN and infinity.
-
-        Raises
-        ------
-        BagError
-            Names topic, quantity, joint and how many messages are affected.
-        """
+        """BagError for NaN and infinity, with topic, quantity, joint and how many messages."""
         for quantity in quantities:
             values = getattr(self, quantity)
             if values is None or np.isfinite(values).all():
@@ -139,30 +111,16 @@ class JointStateSeries:
 
 @dataclass(frozen=True)
 class PoseSeries:
-    """N messages of `geometry_msgs/msg/PoseStamped`.
+    """N messages of `geometry_msgs/msg/PoseStamped`; times (N,) as in `JointStateSeries`."""
 
-    Attributes
-    ----------
-    topic
-        Full name of the topic.
-    frame_id
-        Frame of the first message.
-    stamp_ns, log_ns, publish_ns, sequence
-        As in `JointStateSeries`, shape (N,).
-    position
-        Metres, shape (N, 3).
-    orientation
-        Quaternions x, y, z, w, shape (N, 4).
-    """
-
-    topic: str
-    frame_id: str
+    topic: str  # full name
+    frame_id: str  # of the first message
     stamp_ns: IntArray
     log_ns: IntArray
     publish_ns: IntArray
     sequence: IntArray
-    position: FloatArray
-    orientation: FloatArray
+    position: FloatArray  # (N, 3), m
+    orientation: FloatArray  # (N, 4), quaternions x, y, z, w
 
     def __len__(self) -> int:
         return len(self.stamp_ns)

@@ -10,7 +10,7 @@ import numpy as np
 from endoscope_bags.chunk_sink import is_being_written
 from endoscope_bags.errors import BagError, BagNotFoundError
 from endoscope_bags.event_bag import Event, events_of
-from endoscope_bags.mcap_summary import McapSummary, read_summary
+from endoscope_bags.mcap_records import McapSummary, read_summary
 from endoscope_bags.metadata import SQLITE3, bag_files
 from endoscope_bags.recording import open_bag
 from endoscope_core.errors import EndoscopeError, printable
@@ -47,10 +47,9 @@ class BagEntry:
 
 
 def bags_in(folder: Path) -> list[BagEntry]:
-    """List all recordings of a folder, oldest first.
+    """List all recordings of a folder, oldest first, an unreadable one with its error.
 
-    Of a finished recording only the summary is read, so that damage before it is not noticed.
-    BagNotFoundError if there is no such folder; an unreadable recording is listed with its error.
+    Of a finished one only the summary is read. BagNotFoundError if there is no such folder.
     """
     if not folder.is_dir():
         raise BagNotFoundError(f'{folder}: no such folder')

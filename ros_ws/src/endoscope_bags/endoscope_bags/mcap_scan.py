@@ -24,10 +24,12 @@ from endoscope_bags.mcap_records import (
     MESSAGE_HEAD,
     MESSAGE_HEAD_LENGTH,
     RECORD_HEAD,
+    Allowance,
+    ChunkError,
     Descriptions,
     ExactStream,
+    unpacked,
 )
-from endoscope_bags.unpacking import Allowance, ChunkError, unpacked
 
 UNSURE_NAMES = 'the names of topics agree with no checksum'
 _CRC_STEP = 1 << 24

@@ -6,8 +6,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 
 from endoscope_bags.errors import BagError
-from endoscope_bags.event_bag import held_since
-from endoscope_bags.event_keeping import EventKeeping
+from endoscope_bags.event_bag import EventKeeping, held_since
 from endoscope_bags.recent_messages import RecentMessages
 from endoscope_bags.recording_session import Arrival, RecordingSession, SessionReport
 from endoscope_bags.topic import QosProfile
@@ -18,9 +17,8 @@ from endoscope_core.rig import Rig
 class Recorder:
     """Recordings from `start` to `stop`, and bags of events; each begins with what is in force.
 
-    `path` is where the next recording goes, empty for a new name; bags of events go beside it, at
-    most `most` of them. `collect` has what waits to be read handed to :meth:`take`, and `notify`
-    takes what came of the bags of events, and whether that is an error.
+    `path` is where the next recording goes, empty for a new name; bags of events go beside it. For
+    `collect` and `notify` see :class:`EventKeeping`.
     """
 
     def __init__(
@@ -67,10 +65,7 @@ class Recorder:
         return Path(self.path or new_bag()).parent
 
     def start(self, now_ns: int, remedy: str) -> Path:
-        """Begin a recording and return where it goes; BagError if one is under way already.
-
-        `remedy` is the command that ends that.
-        """
+        """Begin a recording, and say where; BagError, with the `remedy`, if one is under way."""
         if self.session is not None:
             there = with_final_names(str(self.session.path))
             raise BagError(f'already recording to {there}: `{remedy}` ends that')
@@ -99,10 +94,7 @@ class Recorder:
         steady_ns: int,
         stale: bool,
     ) -> None:
-        """Take what arrived by `now_ns`; `holding` is as in :meth:`RecentMessages.add`.
-
-        `stale` says whether chunks are handed over that nothing has closed in time.
-        """
+        """Take what arrived by `now_ns`; `stale` hands over chunks that nothing has closed."""
         self.recent.add(arrivals, holding, now_ns)
         if self.session is not None:
             if arrivals:

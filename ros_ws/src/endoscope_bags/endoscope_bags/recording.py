@@ -9,13 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from rosbags.serde import SerdeError
 
-from endoscope_bags.cdr_decoding import HEAD_WITH_STAMP, QUANTITIES, Payloads, stamps_of_heads
-from endoscope_bags.errors import (
-    BagError,
-    CorruptBagError,
-    MalformedMessageError,
-    UnknownTypeError,
-)
+from endoscope_bags.cdr import HEAD_WITH_STAMP, QUANTITIES, Payloads, stamps_of_heads
+from endoscope_bags.errors import BagError, CorruptBagError, MalformedMessageError, UnknownTypeError
 from endoscope_bags.joint_state_series import (
     JointStateSeries,
     PoseSeries,
@@ -23,12 +18,20 @@ from endoscope_bags.joint_state_series import (
     decode_poses,
 )
 from endoscope_bags.mcap_scan import McapScan, scan_mcap
-from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED, typestore
+from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED, STRING, typestore
 from endoscope_bags.metadata import bag_files
 from endoscope_bags.stored_messages import StoredMessages
 from endoscope_bags.topic import MessageTimes, QosProfile, RawMessage, Topic, qos_from_yaml
 from endoscope_core.errors import FileError
-from endoscope_core.rig import Rig, rig_as_text, rig_from_text, shipped_rig
+from endoscope_core.rig import (
+    Rig,
+    RigKind,
+    kind_from_text,
+    kind_of_several,
+    rig_as_text,
+    rig_from_text,
+    shipped_rig,
+)
 from endoscope_core.schema import LARGEST
 
 IntArray = npt.NDArray[np.int64]
@@ -36,6 +39,8 @@ _NAME, _KEY = 'endoscope_rig', 'rig.yaml'
 """Of the metadata record, which stands before all messages."""
 EVENT_RECORD = 'endoscope_event'
 """Of the record with the reason of an event bag: a fault or an operator's mark."""
+RIG_KIND = 'rig/kind'
+"""Topic, in whatever namespace, of a std_msgs/String."""
 
 
 @contextmanager
@@ -50,30 +55,18 @@ def _naming(path: Path) -> Iterator[None]:
 
 
 class Recording:
-    """A recording that was opened with `open_bag`.
-
-    Attributes
-    ----------
-    path
-        What was opened.
-    topics
-        `Topic` by full name.
-    library
-        The program that wrote the (first) file.
-    metadata
-        MCAP metadata records by name.
-    damage
-        What is wrong, one line each; empty unless it was opened with `salvage`.
-    """
+    """A recording that was opened with `open_bag`."""
 
     def __init__(self, path: Path, scans: Sequence[McapScan], salvage: bool = False) -> None:
-        self.path = path
+        self.path = path  # what was opened
         self._salvage = salvage
-        self.library = scans[0].header.library
+        self.library = scans[0].header.library  # program that wrote the first file
+        # MCAP metadata records by name.
         self.metadata = {k: v for scan in scans for k, v in scan.metadata.items()}
+        # What is wrong, one line each; empty unless it was opened with `salvage`.
         self.damage = tuple(f'{s.path.name}: {what}' for s in scans for what in s.damage)
         self._stored = StoredMessages(scans)
-        self.topics: dict[str, Topic] = {}
+        self.topics: dict[str, Topic] = {}  # by full name
         self._qos: dict[str, tuple[QosProfile, ...]] = {}
         for scan, rows in zip(scans, self._stored.rows, strict=True):
             self._add(scan, dict(rows))
@@ -129,19 +122,10 @@ class Recording:
         return max(int(t.max()) for t in self._stored.log_ns())
 
     def find(self, suffix: str, namespace: str | None = None) -> str:
-        """Return the full name of the topic `suffix` under whatever namespace.
+        """Return the full name of the topic `suffix`, such as ``'motor/measured_js'``.
 
-        Parameters
-        ----------
-        suffix
-            Relative name, for example ``'motor/measured_js'``, or a full one with leading slash.
-        namespace
-            Only this namespace, for example ``'/endoscope'``; the first slash may be left out.
-
-        Raises
-        ------
-        BagError
-            No topic with messages has this name, or topics under several namespaces have it.
+        It stands under whatever namespace, unless that is given or the name begins with a slash.
+        BagError if no topic with messages, or topics under several namespaces, have the name.
         """
         matches = self._matches(suffix, namespace)
         if not matches:
@@ -186,24 +170,11 @@ class Recording:
         order: str = 'stamp',
         finite: Sequence[str] = QUANTITIES,
     ) -> JointStateSeries:
-        """Return all messages of a JointState topic as arrays.
+        """Return all messages of a JointState topic, found as by `find`, as arrays.
 
-        Parameters
-        ----------
-        suffix, namespace
-            See `find`.
-        order
-            ``'stamp'`` (by header stamp; equal ones as recorded) or ``'recorded'`` (file order).
-        finite
-            Quantities that have to be finite in every message; ``()`` lets NaN pass.
-
-        Raises
-        ------
-        MalformedMessageError
-            A message does not decode.
-        BagError
-            None or several topics with messages have this name, it is not a JointState, or a
-            number is NaN or infinite.
+        Their `order` is ``'stamp'`` (of the header; equal ones as recorded) or ``'recorded'``;
+        `finite` names what must not be NaN or infinite. MalformedMessageError where a message does
+        not decode, BagError where the topic is none or several, or not a JointState.
         """
         if order not in ('stamp', 'recorded'):
             raise ValueError(f"order is 'stamp' or 'recorded', not {order!r}")
@@ -238,13 +209,7 @@ class Recording:
         return self._stored.payloads([topic])[0]
 
     def header_stamps(self, topics: Sequence[str]) -> list[IntArray]:
-        """Return the header stamps in ns, each (N,), of topics whose messages begin with a header.
-
-        Parameters
-        ----------
-        topics
-            Full names. Messages too short for a stamp are left out.
-        """
+        """Header stamps in ns, each (N,), of topics by full names; too short messages have none."""
         heads = [
             (block.topic[long], stamps_of_heads(block.data, block.start[long]))
             for block in self._stored.blocks(topics)
@@ -257,13 +222,7 @@ class Recording:
         return np.split(stamp[order], bounds)
 
     def messages(self, topics: Sequence[str] | None = None) -> Iterator[RawMessage]:
-        """Yield messages by receipt time.
-
-        Parameters
-        ----------
-        topics
-            Full names; None for all.
-        """
+        """Yield messages by receipt time, of topics by their full names, or of all."""
         chosen = list(self.topics) if topics is None else list(topics)
         if not chosen:
             return
@@ -296,12 +255,8 @@ class Recording:
     def decoded(self, topic: str) -> Iterator[tuple[RawMessage, Any]]:
         """Yield the messages of a full topic name, each with its object, of whatever type.
 
-        Raises
-        ------
-        UnknownTypeError
-            The type is not one of Jazzy's common ones.
-        MalformedMessageError
-            A message does not decode.
+        UnknownTypeError if that is not one of Jazzy's common ones; MalformedMessageError where a
+        message does not decode.
         """
         store, kind = typestore(), self.topics[topic].type
         if kind not in store.types:
@@ -318,21 +273,11 @@ class Recording:
 
 
 def open_bag(path: str | Path, *, salvage: bool = False) -> Recording:
-    """Open a rosbag2 folder, or a bare ``.mcap`` file.
+    """Open a rosbag2 folder with ``metadata.yaml`` and one or more ``.mcap``, or one such file.
 
-    Parameters
-    ----------
-    path
-        Folder with ``metadata.yaml`` and one or more ``.mcap``, or one such file.
-    salvage
-        Read what is sound of a damaged recording (see `Recording.damage`) instead of raising.
-
-    Raises
-    ------
-    BagNotFoundError, CorruptBagError, BagError
-        The first two are a `BagError` as well, which itself is raised for what is no recording,
-        holds no message or has a format that is not read; the message names the file and what to
-        do.
+    With `salvage` what is sound of a damaged recording is read (see `Recording.damage`) instead of
+    raising a CorruptBagError. BagNotFoundError if it is not there; both are a BagError, as for what
+    is no recording, holds no message or has a format that is not read.
     """
     path = Path(path)
     scans = [scan_mcap(file, salvage=salvage) for file in bag_files(path)]
@@ -361,3 +306,16 @@ def rig_of_bag(recording: Recording) -> Rig:
     """Return the rig that a recording carries; as shipped where it carries none."""
     text = recording.metadata.get(_NAME, {}).get(_KEY)
     return shipped_rig() if text is None else rig_from_text(text, f'the rig of {recording.path}')
+
+
+def kind_of_bag(recording: Recording) -> RigKind:
+    """Kind of a recording's rig: of several, as after a change of servos, real only if all are."""
+    kinds = []
+    for name, topic in recording.topics.items():
+        if not f'/{name}'.endswith(f'/{RIG_KIND}') or topic.type != STRING:
+            continue
+        try:
+            kinds += [kind_from_text(message.data) for _, message in recording.decoded(name)]
+        except MalformedMessageError:
+            kinds.append(RigKind())
+    return kind_of_several(kinds)

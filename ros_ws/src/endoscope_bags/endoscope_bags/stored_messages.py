@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from endoscope_bags.cdr_decoding import Payloads
+from endoscope_bags.cdr import Payloads
 from endoscope_bags.mcap_scan import McapScan
 from endoscope_bags.topic import MessageTimes
 

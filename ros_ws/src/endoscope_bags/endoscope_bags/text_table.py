@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_bags.bag_writer import BagWriter, MessageStream
-from endoscope_bags.cdr_encoding import encode_joint_states
+from endoscope_bags.cdr import encode_joint_states
 from endoscope_bags.delimited_text import DelimitedText, read_table
 from endoscope_bags.errors import BagError
 from endoscope_bags.information import SILENT_PERIODS

@@ -82,30 +82,14 @@ def _from_entry(entry: dict[str, Any]) -> QosProfile:
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic of a recording.
+    """A topic of a recording."""
 
-    Attributes
-    ----------
-    name
-        Full name, for example ``'/endoscope/motor/measured_js'``.
-    type
-        Message type, for example ``'sensor_msgs/msg/JointState'``.
-    message_count
-        Number of messages.
-    definition
-        `ros2msg` text of the type as recorded.
-    type_hash
-        RIHS01 hash as recorded; empty where the recorder did not say.
-    qos
-        What the publishers offered; empty where the recorder did not say.
-    """
-
-    name: str
-    type: str
+    name: str  # full, for example ``'/endoscope/motor/measured_js'``
+    type: str  # for example ``'sensor_msgs/msg/JointState'``
     message_count: int
-    definition: str
-    type_hash: str
-    qos: tuple[QosProfile, ...]
+    definition: str  # `ros2msg` text of the type as recorded
+    type_hash: str  # RIHS01; empty where the recorder did not say, like `qos`
+    qos: tuple[QosProfile, ...]  # what the publishers offered
 
 
 class RawMessage(NamedTuple):

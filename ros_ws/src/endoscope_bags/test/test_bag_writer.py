@@ -7,7 +7,7 @@ from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
 from endoscope_bags import BagWriter, MessageStream, open_bag
-from endoscope_bags.cdr_encoding import encode_joint_states, encode_string
+from endoscope_bags.cdr import encode_joint_states, encode_string
 from endoscope_bags.errors import BagError, BagExistsError, MalformedMessageError, UnknownTypeError
 from endoscope_bags.message_types import JOINT_STATE, STRING, message_type
 from endoscope_bags.topic import LATCHED_QOS, SENSOR_QOS, qos_from_yaml

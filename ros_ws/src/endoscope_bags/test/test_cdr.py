@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from endoscope_bags.cdr_decoding import Payloads
-from endoscope_bags.cdr_encoding import (
+from endoscope_bags.cdr import (
+    Payloads,
     TransformEncoder,
     encode_clock,
     encode_joint_state,

@@ -3,7 +3,7 @@
 import pytest
 
 from endoscope_bags import BagWriter, open_bag
-from endoscope_bags.cdr_encoding import encode_string
+from endoscope_bags.cdr import encode_string
 from endoscope_bags.copying import cut
 from endoscope_bags.errors import BagError, BagExistsError
 from endoscope_bags.information import bag_information

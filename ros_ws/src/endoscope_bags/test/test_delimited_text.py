@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from endoscope_bags import open_bag
-from endoscope_bags.delimited_text import date_ns, read_table
+from endoscope_bags.delimited_text import date_ns, described_table, read_table
 from endoscope_bags.errors import BagError
-from endoscope_bags.mapping_skeleton import described_table
 from endoscope_bags.table_mapping import EXAMPLE, TableMapping, load_table_mapping
 from endoscope_bags.text_table import convert_table
 from endoscope_core.errors import FileError

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from endoscope_bags import BagError, BagWriter, MessageStream, open_bag
-from endoscope_bags.cdr_encoding import encode_joint_states
-from endoscope_bags.dataset_card import ChannelDelay, dataset_card
+from endoscope_bags.cdr import encode_joint_states
 from endoscope_bags.episode import channels_of, episodes_of, refuse_other_channels
+from endoscope_bags.lerobot_dataset import ChannelDelay, dataset_card
 from endoscope_bags.message_types import JOINT_STATE, WRENCH_STAMPED, typestore
 from endoscope_core.rig import Kind
 

@@ -3,7 +3,7 @@
 import pytest
 
 from endoscope_bags import BagError, open_bag
-from endoscope_bags.cdr_encoding import encode_string
+from endoscope_bags.cdr import encode_string
 from endoscope_bags.copying import cut, recover
 from endoscope_bags.event_bag import (
     FAULT,

@@ -3,7 +3,7 @@
 import pytest
 
 from endoscope_bags import open_bag
-from endoscope_bags.cdr_encoding import encode_joint_state
+from endoscope_bags.cdr import encode_joint_state
 from endoscope_bags.errors import BagError
 from endoscope_bags.event_bag import event_bags, events_of
 from endoscope_bags.recent_messages import RecentMessages

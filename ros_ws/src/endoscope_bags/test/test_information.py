@@ -3,7 +3,7 @@
 import pytest
 
 from endoscope_bags import BagWriter, open_bag
-from endoscope_bags.cdr_encoding import encode_joint_state, encode_string
+from endoscope_bags.cdr import encode_joint_state, encode_string
 from endoscope_bags.information import bag_information
 from endoscope_bags.message_types import JOINT_STATE, STRING
 from endoscope_bags.topic import LATCHED_QOS

@@ -5,9 +5,9 @@ import pytest
 from mcap.writer import Writer
 
 from endoscope_bags import BagWriter, open_bag
-from endoscope_bags.cdr_encoding import encode_string
+from endoscope_bags.cdr import encode_string
 from endoscope_bags.listing import bags_in
-from endoscope_bags.mcap_summary import read_summary
+from endoscope_bags.mcap_records import read_summary
 from endoscope_bags.message_types import STRING
 
 START, MS = 1_790_000_000 * 10**9, 10**6

@@ -14,7 +14,7 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Sqlite3Writer
 
 from endoscope_bags import BagError, BagWriter, open_bag
-from endoscope_bags.cdr_encoding import encode_joint_state, encode_string
+from endoscope_bags.cdr import encode_joint_state, encode_string
 from endoscope_bags.errors import BagNotFoundError, CorruptBagError, MalformedMessageError
 from endoscope_bags.listing import bags_in
 from endoscope_bags.message_types import JOINT_STATE, STRING, typestore

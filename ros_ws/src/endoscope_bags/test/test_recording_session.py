@@ -9,7 +9,7 @@ import pytest
 
 from endoscope_bags import open_bag
 from endoscope_bags.bag_writer import CHUNK_SECONDS
-from endoscope_bags.cdr_encoding import encode_string
+from endoscope_bags.cdr import encode_string
 from endoscope_bags.information import bag_information
 from endoscope_bags.message_types import STRING
 from endoscope_bags.recording_session import Arrival, RecordingSession, simulated_receipt_ns

@@ -5,7 +5,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from endoscope_bags import BagWriter, open_bag
-from endoscope_bags.cdr_encoding import encode_string
+from endoscope_bags.cdr import encode_string
 from endoscope_bags.copying import recover
 from endoscope_bags.errors import BagError, BagNotFoundError
 from endoscope_bags.message_types import STRING, MessageType

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from endoscope_bags import BagWriter, open_bag
-from endoscope_bags.cdr_encoding import encode_string
+from endoscope_bags.cdr import encode_string
 from endoscope_bags.copying import cut, recover
 from endoscope_bags.message_types import STRING
 from endoscope_bags.recording import rig_of_bag, rig_record

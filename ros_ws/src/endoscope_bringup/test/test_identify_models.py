@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from endoscope_bags import BagWriter, MessageStream
-from endoscope_bags.cdr_encoding import encode_joint_states
+from endoscope_bags.cdr import encode_joint_states
 from endoscope_bags.message_types import JOINT_STATE
 from endoscope_bringup.cli import main
 from endoscope_core.control import PhysicalParameters

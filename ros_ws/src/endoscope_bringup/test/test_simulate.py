@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from endoscope_bags import BagWriter, MessageStream, open_bag
-from endoscope_bags.cdr_encoding import encode_joint_states, encode_poses
+from endoscope_bags.cdr import encode_joint_states, encode_poses
 from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED
-from endoscope_bags.rig_kind import kind_of_bag
+from endoscope_bags.recording import kind_of_bag
 from endoscope_bringup.cli import main
 from endoscope_core.kinematics import bending_from_orientation, tip_pose
 from endoscope_core.physics import PlantDescription, SensorModel, save_plant, simulate

@@ -40,10 +40,9 @@ class BackgroundCommand:
         *,
         answers: bool = False,
     ) -> int:
-        """Run `endoscope` with these words; its status.
+        """Run `endoscope`, lines of its output to `line`, of its errors to `step`; its status.
 
-        `line` takes each line of its output and `step` of its errors. With `answers`, `answer`
-        writes to its input. On an exception in either the command is killed.
+        With `answers`, `answer` writes to its input. On an exception there it is killed.
         """
         pipe, nothing = asyncio.subprocess.PIPE, asyncio.subprocess.DEVNULL
         process = self._process = await asyncio.create_subprocess_exec(

@@ -9,12 +9,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from endoscope_console.beat import Beat, Situation
-from endoscope_console.clients import Client, Clients
+from endoscope_console.clients import Attendance, Client, Clients, Lease
 from endoscope_console.graph_side import GraphSide
-from endoscope_console.handle_place import HandlePlace
-from endoscope_console.playing import Holder, Playing
+from endoscope_console.playing import HandlePlace, Holder, Playing
 from endoscope_console.teleop.frames import InputFrame
-from endoscope_console.teleop.lease import Attendance, Lease
 from endoscope_console.teleop.operator import DeadManState, Reason
 from endoscope_core.choices import FOLLOW_THE_HANDLE
 from endoscope_core.errors import EndoscopeError

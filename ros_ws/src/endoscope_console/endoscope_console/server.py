@@ -201,7 +201,7 @@ class Console:
                     await socket.close(_MALFORMED, _short(str(error)))
                     return
         finally:
-            client.notify = _nobody
+            client.notify = lambda message: None
             self.clients.leave(client)
             self.operations.controls.closed(client)
 
@@ -267,10 +267,6 @@ def _file(path: Path) -> Callable[[Request], Awaitable[Response]]:
 def _short(why: str) -> str:
     """As much of a reason as fits into a socket's last frame."""
     return why.encode()[:120].decode(errors='ignore')
-
-
-def _nobody(message: dict[str, object]) -> None:
-    """Send nothing to a client that is gone."""
 
 
 async def _send(socket: WebSocket, client: Client) -> None:

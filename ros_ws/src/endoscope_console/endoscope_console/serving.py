@@ -12,7 +12,6 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterable
 from contextlib import ExitStack, nullcontext
 from typing import Any
 from urllib.parse import urlsplit
@@ -173,13 +172,15 @@ async def _serve(
         gc.freeze()
         gc.set_threshold(*GC_THRESHOLDS)
         answering = asyncio.create_task(server.serve(sockets=[listening]))
-        others = {
+        others: set[asyncio.Task[Any]] = {
             asyncio.create_task(console.make_pictures()),
             asyncio.create_task(_announce(args, address, tokens, graph, started)),
-            asyncio.create_task(_asked(stop)),
+            asyncio.create_task(stop.wait()),
         }
         try:
-            await _until_one_ends({answering, *others})
+            done, _ = await asyncio.wait({answering, *others}, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                task.result()
         finally:
             await operations.close()
             await background.close()
@@ -188,17 +189,6 @@ async def _serve(
             for task in others:
                 task.cancel()
             await asyncio.wait(others)
-
-
-async def _asked(stop: asyncio.Event) -> None:
-    await stop.wait()
-
-
-async def _until_one_ends(tasks: Iterable[asyncio.Task[None]]) -> None:
-    """Wait for the first of them; raise what it raised."""
-    done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-    for task in done:
-        task.result()
 
 
 async def _announce(

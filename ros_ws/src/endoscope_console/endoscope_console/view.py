@@ -8,13 +8,12 @@ from typing import Any
 
 import msgspec
 
-from endoscope_console.alarms import Alarm, Urgency
+from endoscope_console.alarms import FORCE, GUARD, Alarm, TipAlarms, Urgency, number, tip_state
+from endoscope_console.clients import UNATTENDED_NS
 from endoscope_console.command import SLOWEST_HZ
 from endoscope_console.graph_side import GraphSide, is_calibrated
 from endoscope_console.operations import Operations
-from endoscope_console.teleop.lease import UNATTENDED_NS
 from endoscope_console.teleop.operator import STATE_NS, DeadManState, Reason
-from endoscope_console.tip import FORCE, GUARD, TipAlarms, number, tip_state
 from endoscope_core.rig import Rig
 from endoscope_nodes.client.calibration_result import NONE_OF_THEM
 from endoscope_nodes.client.graph_client import GraphClient
@@ -201,67 +200,54 @@ class View:
         watch = client.health.get(WATCH)
         reason = operations.controls.beat.report.reason
         factor = client.factor
-        found = [
-            (
-                client.state == 'FAULT',
-                Alarm('fault', Urgency.HIGH, client.why or 'the slave is in FAULT', latched=True),
-            ),
-            (
-                operations.controls.attendance.lacks,
-                Alarm('unattended', Urgency.HIGH, _UNATTENDED, latched=True),
-            ),
-            (silent and enabled, Alarm('supervisor', Urgency.HIGH, 'the supervisor is silent')),
-            (silent and not enabled, Alarm('graph', Urgency.LOW, 'no supervisor is heard')),
-            (
-                self._graph.pictures.tracked_age_s > _LOST_S and not silent,
-                Alarm('tracker', Urgency.MEDIUM, 'the tracker is silent'),
-            ),
-            (
-                reason in _OF_A_BUSY_MACHINE,
-                Alarm('dead_man', Urgency.MEDIUM, f'the dead-man was released: {reason}'),
-            ),
-            (
-                not is_calibrated(client.calibration) and not silent,
-                Alarm('calibration', Urgency.LOW, 'not calibrated'),
-            ),
-            (
-                compensator is not None and compensator.values.get('mode') == 'none',
-                Alarm('compensator', Urgency.LOW, 'nothing is compensated'),
-            ),
-        ]
+        found: list[Alarm] = []
+
+        def note(name: str, level: Urgency, text: str, latched: bool = False) -> None:
+            found.append(Alarm(name, level, text, latched))
+
+        if client.state == 'FAULT':
+            note('fault', Urgency.HIGH, client.why or 'the slave is in FAULT', latched=True)
+        if operations.controls.attendance.lacks:
+            note('unattended', Urgency.HIGH, _UNATTENDED, latched=True)
+        if silent and enabled:
+            note('supervisor', Urgency.HIGH, 'the supervisor is silent')
+        elif silent:
+            note('graph', Urgency.LOW, 'no supervisor is heard')
+        elif self._graph.pictures.tracked_age_s > _LOST_S:
+            note('tracker', Urgency.MEDIUM, 'the tracker is silent')
+        if reason in _OF_A_BUSY_MACHINE:
+            note('dead_man', Urgency.MEDIUM, f'the dead-man was released: {reason}')
+        if not is_calibrated(client.calibration) and not silent:
+            note('calibration', Urgency.LOW, 'not calibrated')
+        if compensator is not None and compensator.values.get('mode') == 'none':
+            note('compensator', Urgency.LOW, 'nothing is compensated')
         if watch is not None and _LEVELS[_level(watch)] == 'warning':
-            found.append((True, Alarm('watch', Urgency.MEDIUM, watch.message)))
+            note('watch', Urgency.MEDIUM, watch.message)
         elif watch is not None and watch.message.startswith(LEARNING):
-            found.append((True, Alarm('watch', Urgency.LOW, f'the watch is {watch.message}')))
+            note('watch', Urgency.LOW, f'the watch is {watch.message}')
         if tension is not None and tension[0] > _TENSE * self._rig.tension.ceiling:
-            text = f'{tension[1]} is above {_TENSE * self._rig.tension.ceiling:.0f} N'
-            found.append((True, Alarm('tension', Urgency.HIGH, text)))
+            above = f'{tension[1]} is above {_TENSE * self._rig.tension.ceiling:.0f} N'
+            note('tension', Urgency.HIGH, above)
         load, cores = os.getloadavg()[0], len(os.sched_getaffinity(0))
         slow = factor is not None and factor < _SLOW
         if slow or (reason in _OF_A_BUSY_MACHINE and load > cores):
-            text = busy(load, cores, factor if slow else None, self._rate)
-            found.append((True, Alarm('busy', Urgency.MEDIUM, text)))
+            note('busy', Urgency.MEDIUM, busy(load, cores, factor if slow else None, self._rate))
         refused = self._refused()
         if refused and enabled:
-            found.append((True, Alarm('refused', Urgency.MEDIUM, refused)))
+            note('refused', Urgency.MEDIUM, refused)
         if recorder is not None and recorder.level:
-            found.append((True, Alarm('recorder', Urgency.MEDIUM, recorder.message)))
-        push, guard = self._graph.pictures.push, client.health.get(GUARD)
-        tip = self._tip_alarms.update(now_ns, push, guard)
-        return [*(alarm for is_so, alarm in found if is_so), *tip]
+            note('recorder', Urgency.MEDIUM, recorder.message)
+        guard = client.health.get(GUARD)
+        return [*found, *self._tip_alarms.update(now_ns, self._graph.pictures.push, guard)]
 
 
 def busy(load: float, cores: int, pace: float | None, rate: int) -> str:
     """Message that the machine is too busy, by how much, with the remedy."""
-    by = f'load {load:.0f} on {_counted(cores)}'
+    by = f'load {load:.0f} on {cores} core{"s" * (cores != 1)}'
     by += '' if pace is None else f', simulated at {pace:.1f} of real time'
     how = 'close other pages, viewers and programs'
     slower = f', or start the console with --rate {SLOWEST_HZ}'
     return f'the machine is too busy ({by}): {how}{slower if rate > SLOWEST_HZ else ""}'
-
-
-def _counted(cores: int) -> str:
-    return '1 core' if cores == 1 else f'{cores} cores'
 
 
 def result(health: Health | None) -> dict[str, Any] | None:

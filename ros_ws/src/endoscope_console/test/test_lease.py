@@ -3,7 +3,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from endoscope_console.teleop.lease import LEASE_SILENCE_NS, UNATTENDED_NS, Attendance, Lease
+from endoscope_console.clients import LEASE_SILENCE_NS, UNATTENDED_NS, Attendance, Lease
 
 MS = 1_000_000
 

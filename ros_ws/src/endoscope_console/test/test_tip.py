@@ -2,8 +2,7 @@
 
 import pytest
 
-from endoscope_console.alarms import Urgency
-from endoscope_console.tip import TipAlarms, TipState, tip_state
+from endoscope_console.alarms import TipAlarms, TipState, Urgency, tip_state
 from endoscope_nodes.client.graph_listener import Health
 
 SECOND = 1_000_000_000

@@ -19,10 +19,7 @@ _UNKNOWN = (errno.EBADF, errno.ENOLCK, errno.ENOTSUP)
 
 @contextmanager
 def held(folder: Path) -> Iterator[None]:
-    """Hold a folder, which is made; InputError while another program does.
-
-    The system takes it back from a program that is killed.
-    """
+    """Hold a folder, which is made, while the program lives; InputError while another does."""
     folder.mkdir(parents=True, exist_ok=True)
     descriptor = os.open(folder, os.O_RDONLY)
     try:

@@ -17,13 +17,9 @@ class NoLoopError(EndoscopeError, ValueError):
 def width_at_mid_height(desired: ArrayLike, actual: ArrayLike) -> float:
     """Width of the hysteresis loop at the middle of its height, in the unit of `desired`.
 
-    The loop is cut half-way between the least and the greatest actual angle; its width is the mean
-    desired angle at which the actual angle rises through that level, less the one at which it falls
-    through it. Positive where the actual angle lags. Both are (N,) at the same instants, in time
-    order, over at least one whole loop, in rad or deg.
-
-    NoLoopError if the actual angle does not pass its middle both upwards and downwards. ValueError
-    if the shapes are wrong or a value is not finite.
+    That is the mean desired angle at which the actual one rises through the level, less that at
+    which it falls: positive where it lags. Both (N,), in time order, over a whole loop or more.
+    NoLoopError if there is none, ValueError for wrong shapes or what is not finite.
     """
     u = np.asarray(desired, dtype=float)
     q = np.asarray(actual, dtype=float)

@@ -17,10 +17,10 @@ from endoscope_core.calibration import (
     with_zeros,
     zero_errors,
 )
-from endoscope_core.calibration.calibration_run import CalibrationCommand
-from endoscope_core.calibration.order_feedback import (
+from endoscope_core.calibration.calibration_run import (
     CALIBRATE,
     HOME,
+    CalibrationCommand,
     OrderCode,
     OrderFeedback,
     OrderState,
@@ -166,11 +166,10 @@ class CalibrationOrder(Order):
 
 
 class Orders:
-    """What calibration has been ordered: one order at a time, begun only where it can go well.
+    """One order of calibration at a time, aborted by whatever makes it worthless or doubtful.
 
-    Whatever makes the recording worthless or motion doubtful aborts it. `return_speed`, in rad/s,
-    and `rest`, in s, are those of :class:`CalibrationRun`; `remedy` is how to work without
-    calibration.
+    `return_speed`, in rad/s, and `rest`, in s, are those of :class:`CalibrationRun`; `remedy` is
+    how to work without calibration.
     """
 
     def __init__(

@@ -1,7 +1,7 @@
 """What can be chosen by name is what there is."""
 
 from endoscope_core import choices
-from endoscope_core.hysteresis.inverse import MODELS
+from endoscope_core.hysteresis import MODELS
 from endoscope_core.signals import MOTIONS, calibration_motion
 
 

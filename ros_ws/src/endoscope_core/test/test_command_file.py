@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from endoscope_core.errors import FileError
-from endoscope_core.signals.command_file import read_command_file, write_command_file
+from endoscope_core.signals.sampled_motion import read_command_file, write_command_file
 
 
 def test_what_is_written_is_read_back(tmp_path):

@@ -7,10 +7,9 @@ from hypothesis import strategies as st
 from safe_parameters import SAFE
 from scipy.integrate import solve_ivp
 
-from endoscope_core.hysteresis import DahlParameters, direct_inverse
+from endoscope_core.hysteresis import MODELS, DahlParameters, direct_inverse
 from endoscope_core.hysteresis.dahl import dahl_step
-from endoscope_core.hysteresis.inverse import MODELS, DirectInverse
-from endoscope_core.hysteresis.memory_model import GREATEST_INVERSE_SLOPE
+from endoscope_core.hysteresis.memory_model import GREATEST_INVERSE_SLOPE, DirectInverse
 
 TIME = np.arange(0.0, 9.0, 0.01)
 MOTION = 0.9 * np.sin(TIME) + 0.5 * np.sin(1.73 * TIME)

@@ -5,8 +5,7 @@ import pytest
 from play_loop import play
 
 from endoscope_core.errors import InputError
-from endoscope_core.hysteresis import DahlParameters, forward
-from endoscope_core.hysteresis.inverse import MODELS
+from endoscope_core.hysteresis import MODELS, DahlParameters, forward
 from endoscope_core.hysteresis.memory_model import (
     GREATEST_ALPHA,
     GREATEST_INVERSE_SLOPE,

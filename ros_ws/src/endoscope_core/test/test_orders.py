@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from endoscope_core.calibration.order_feedback import CALIBRATE, HOME, OrderCode, OrderState
+from endoscope_core.calibration.calibration_run import CALIBRATE, HOME, OrderCode, OrderState
 from endoscope_core.classifier.classification import (
     ClassificationResult,
     ClassifierError,

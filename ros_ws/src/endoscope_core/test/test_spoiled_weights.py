@@ -13,7 +13,7 @@ import pytest
 import safetensors.numpy
 
 from endoscope_core.classifier.classification import ClassifierError
-from endoscope_core.classifier.weights_file import load_classifier, sealed, shipped_weights
+from endoscope_core.classifier.cnn_classifier import load_classifier, sealed, shipped_weights
 
 CNN = shipped_weights('sinusoid')
 
@@ -133,7 +133,7 @@ def test_judging_needs_no_pytorch():
     program = (
         'import sys\n'
         'import numpy as np\n'
-        'from endoscope_core.classifier.weights_file import load_classifier\n'
+        'from endoscope_core.classifier.cnn_classifier import load_classifier\n'
         'classifier = load_classifier()\n'
         'classifier.judged(np.ones((1, 6561, 4), np.float32))\n'
         "print('torch' in sys.modules)\n"

@@ -29,11 +29,7 @@ class MotorReading:
 
 
 class MotorDevice(Protocol):
-    """A set of servos in position mode.
-
-    A real bus runs in a thread of its own; :meth:`exchange` hands over the newest goal, takes the
-    newest reading, and never waits.
-    """
+    """Servos in position mode, as a thread runs a real bus: no call waits."""
 
     names: tuple[str, ...]
 
@@ -45,16 +41,10 @@ class MotorDevice(Protocol):
         """Connect and check the settings; DeviceError where not reachable, or set up wrongly."""
 
     def set_torque(self, on: bool) -> None:
-        """Let the servos hold their position and then follow goals, or switch them off.
-
-        After an error goals are refused until torque is switched on again.
-        """
+        """Let the servos hold and then follow goals, or switch them off; ends an error."""
 
     def exchange(self, goal: Sequence[float], periods: int) -> MotorReading | None:
-        """Set the goal (J,) in rad and give the newest valid reading; None while none is new.
-
-        The goal is the newest command; `periods` are control periods (1 ms) since the last call.
-        """
+        """Renew the goal (J,) in rad after `periods` of 1 ms; the newest reading, if it is new."""
 
     def trouble(self) -> str:
         """The error that prevents motion, empty if none; called in every tick."""
@@ -67,11 +57,7 @@ class MotorDevice(Protocol):
 
 
 class ReadingThread[Reading](ABC):
-    """Reads from `open` to `close`; taking readings never waits for the device.
-
-    `name`: of the thread.
-    `kept`: length of the queue; the oldest reading is dropped for the newest.
-    """
+    """Reads from `open` to `close` into a queue of `kept` readings; taking them never waits."""
 
     def __init__(self, name: str, kept: int) -> None:
         self._readings: deque[Reading] = deque(maxlen=kept)

@@ -39,10 +39,7 @@ class SimulatedSlave:
         self._torque = on
 
     def exchange(self, goal: Sequence[float], periods: int) -> MotorReading | None:
-        """Advance the plant under the goal, which has been in force since the last call.
-
-        The first call only reads: time begins there.
-        """
+        """Advance under the goal that is in force since the last call; the first only reads."""
         if not self._started:
             self._started = True
             return self._take(self._simulator.sample)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from endoscope_devices.load_cells.calibration_file import FaultLimits, WireCell
-from endoscope_devices.load_cells.channel_check import ChannelCheck
+from endoscope_devices.load_cells.modbus_load_cells import ChannelCheck
 
 MS = 1_000_000
 CELL = WireCell(0, 'int32', 0.001, 1, 0.0)

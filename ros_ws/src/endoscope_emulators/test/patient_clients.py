@@ -4,9 +4,9 @@ import time
 
 from dynamixel_sdk import PortHandler
 
+from endoscope_devices.dynamixel.bring_up import BusSettings
 from endoscope_devices.dynamixel.dynamixel_motors import DynamixelMotors
 from endoscope_devices.dynamixel.packet_handler import NoReplyError
-from endoscope_devices.dynamixel.settings import BusSettings
 
 PATIENCE_S = 120.0
 

@@ -5,7 +5,7 @@ import time
 import pytest
 from patient_clients import PATIENCE_S, opened
 
-from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
+from endoscope_devices.dynamixel.bring_up import BusSettings, ServoMount
 from endoscope_emulators.dynamixel.process import EmulatorProcess
 
 MOUNTS = (ServoMount('motor_x', 1), ServoMount('motor_y', 2))

@@ -10,6 +10,7 @@ from patient_clients import PATIENCE_S, opened
 
 from endoscope_core.rig import Kind
 from endoscope_devices.device import DeviceError
+from endoscope_devices.dynamixel.bring_up import BusSettings, ServoMount
 from endoscope_devices.dynamixel.control_table import (
     ALERT,
     CURRENT_UNIT,
@@ -28,7 +29,6 @@ from endoscope_devices.dynamixel.packet_handler import (
     sync_write_request,
 )
 from endoscope_devices.dynamixel.serial_port import BusPort
-from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
 from endoscope_emulators.dynamixel.bus import EmulatedBus
 from endoscope_emulators.dynamixel.control_table import BAUD_RATE, GOAL_VELOCITY
 from endoscope_emulators.dynamixel.process import EmulatorProcess

@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_bags import BagWriter, JointStateSeries, MessageStream, PoseSeries, Recording
-from endoscope_bags.cdr_encoding import encode_joint_states, encode_poses, encode_string
+from endoscope_bags.cdr import encode_joint_states, encode_poses, encode_string
 from endoscope_bags.message_types import JOINT_STATE, POSE_STAMPED, STRING
-from endoscope_bags.recording import rig_of_bag, rig_record
-from endoscope_bags.rig_kind import RIG_KIND
+from endoscope_bags.recording import RIG_KIND, rig_of_bag, rig_record
 from endoscope_bags.topic import LATCHED_QOS
 from endoscope_core.errors import InputError
 from endoscope_core.kinematics import tip_pose

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from endoscope_bags.errors import BagError
 from endoscope_bags.information import counted_losses
 from endoscope_bags.joint_state_series import JointStateSeries
-from endoscope_bags.recording import Recording, open_bag, rig_of_bag
-from endoscope_bags.rig_kind import kind_of_bag
+from endoscope_bags.recording import Recording, kind_of_bag, open_bag, rig_of_bag
 from endoscope_bags.sequence_gaps import SequenceGaps
 from endoscope_core.choices import WAIVABLE
 from endoscope_core.physics.description import PlantDescription

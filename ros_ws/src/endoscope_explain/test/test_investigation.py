@@ -16,7 +16,7 @@ from endoscope_core.physics.plant_file import load_plant, save_plant
 from endoscope_core.physics.simulator import TICK
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals import hold, move, sequence
-from endoscope_core.signals.command_file import CommandTable, read_command_file
+from endoscope_core.signals.sampled_motion import CommandTable, read_command_file
 from endoscope_explain import prediction_set
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.case import Inputs, Sources

@@ -10,7 +10,7 @@ import pytest
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.plant_file import load_plant
 from endoscope_core.rig import Kind
-from endoscope_core.signals.command_file import read_command_file
+from endoscope_core.signals.sampled_motion import read_command_file
 from endoscope_explain.audit import AuditReport, Finding, Severity
 from endoscope_explain.case import NextExperiment, combined_effects, combined_verdict
 from endoscope_explain.explanation import Estimate, NominalEstimate, Verdict

@@ -18,7 +18,7 @@ from endoscope_core.errors import EndoscopeError, NotPlayedError, RigStoppedErro
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.plant_file import save_plant
 from endoscope_core.rig import shipped_rig
-from endoscope_core.signals.command_file import CommandTable, read_command_file
+from endoscope_core.signals.sampled_motion import CommandTable, read_command_file
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.case import ExplainedCase, Inputs, Sources
 from endoscope_explain.experiment_motions import SAMPLE_S, as_played, library

@@ -13,7 +13,7 @@ from rclpy.context import Context
 from sensor_msgs.msg import JointState
 
 from endoscope_bags import open_bag
-from endoscope_bags.cdr_encoding import encode_joint_state
+from endoscope_bags.cdr import encode_joint_state
 from endoscope_lab.bench import cpu_seconds
 from endoscope_nodes.runtime.environment import stay_on_this_machine
 from endoscope_nodes.runtime.qos import SENSOR_OFFERED

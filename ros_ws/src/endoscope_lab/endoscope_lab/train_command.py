@@ -93,7 +93,7 @@ def _save_weights(
     import safetensors.numpy
 
     from endoscope_core.atomic_output import atomic_file, write_text
-    from endoscope_core.classifier.weights_file import SCHEMA, sealed
+    from endoscope_core.classifier.cnn_classifier import SCHEMA, sealed
 
     described = {'schema': SCHEMA, 'kind': 'cnn', **description}
     data = safetensors.numpy.save({k: np.asarray(x, order='C') for k, x in state.items()})

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from endoscope_core.atomic_output import write_text
-from endoscope_core.classifier.weights_file import load_classifier
+from endoscope_core.classifier.cnn_classifier import load_classifier
 from endoscope_core.control import FeedforwardLaw
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.identification.law_choice import CalibrationFindings, LawChoice

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from endoscope_core.classifier.weights_file import load_classifier
+from endoscope_core.classifier.cnn_classifier import load_classifier
 from endoscope_core.control import (
     DesiredMotion,
     Feedforward,

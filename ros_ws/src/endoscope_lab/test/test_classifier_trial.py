@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from endoscope_core.classifier.classification import UnseenTensionError
-from endoscope_core.classifier.weights_file import load_classifier
+from endoscope_core.classifier.cnn_classifier import load_classifier
 from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
 from endoscope_lab.dataset import CLASSES_DEG, record_calibration
 from endoscope_lab.papers.calibrations import judged_at_rate, tubes_of_classes

@@ -12,8 +12,8 @@ from endoscope_core.classifier.cnn_classifier import (
     Estimates,
     HeldOutCalibration,
     course,
+    load_classifier,
 )
-from endoscope_core.classifier.weights_file import load_classifier
 from endoscope_core.physics import PlantDescription, simulate
 from endoscope_core.signals import CALIBRATION_MOTIONS, calibration_motion
 from endoscope_lab.dataset import CLASSES_DEG, random_instrument, record_calibration

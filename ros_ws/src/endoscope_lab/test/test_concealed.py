@@ -7,7 +7,7 @@ import pytest
 
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.functions import FUNCTIONS
-from endoscope_core.physics.functions.expression import evaluate
+from endoscope_core.physics.functions.term import evaluate
 from endoscope_lab.concealed import motions
 from endoscope_lab.concealed.forms import DRAWN, drawn_form, drawn_formula, visited
 from endoscope_lab.concealed.judge import Statement, judged, law_at_place, law_of_effect

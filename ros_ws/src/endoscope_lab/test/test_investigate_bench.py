@@ -6,7 +6,7 @@ import pytest
 from endoscope_core.names import JOINTS
 from endoscope_core.physics import PlantDescription
 from endoscope_core.rig import shipped_rig
-from endoscope_core.signals.command_file import CommandTable
+from endoscope_core.signals.sampled_motion import CommandTable
 from endoscope_explain.investigation.motions import RigMotion, commissioning, require_allowed
 from endoscope_explain.takes import recordings_joined
 from endoscope_lab.investigate import FIXED, KINDS, SimulatedRig, drawn_rig, fixed_motion

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from endoscope_bringup.cli import main
-from endoscope_core.classifier.weights_file import load_classifier
+from endoscope_core.classifier.cnn_classifier import load_classifier
 from endoscope_core.identification import load_class_parameters
 from endoscope_lab.dataset import load_dataset
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from endoscope_core.classifier.weights_file import load_classifier
+from endoscope_core.classifier.cnn_classifier import load_classifier
 from endoscope_core.control import FeedforwardLaw
 from endoscope_core.identification.law_choice import LawChoice
 from endoscope_core.signals import periodic_signal

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from outside_data import REAL, needs
 
-from endoscope_core.hysteresis.inverse import MODELS
+from endoscope_core.hysteresis import MODELS
 from endoscope_core.identification import HysteresisRecording
 from endoscope_lab.papers.real_recordings import hysteresis_model, left_of_the_rest, real_recordings
 from endoscope_lab.real.prandtl_ishlinskii import fitted

@@ -2,7 +2,7 @@
 
 import pytest
 
-from endoscope_core.classifier.weights_file import load_classifier
+from endoscope_core.classifier.cnn_classifier import load_classifier
 from endoscope_lab.papers.tracking_trial import calibrate, never_seen_tube
 from endoscope_lab.validity import Slow, creeping, is_detected, plant_after
 

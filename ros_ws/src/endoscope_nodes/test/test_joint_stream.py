@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
-from endoscope_bags.cdr_encoding import encode_joint_state
+from endoscope_bags.cdr import encode_joint_state
 from endoscope_bags.errors import MalformedMessageError
 from endoscope_nodes.runtime.streams import JointPublisher, JointReader
 

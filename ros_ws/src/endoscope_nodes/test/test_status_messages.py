@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 
-from endoscope_core.calibration.order_feedback import OrderCode, OrderFeedback, OrderState
+from endoscope_core.calibration.calibration_run import OrderCode, OrderFeedback, OrderState
 from endoscope_core.classifier.classification import ClassificationResult
 from endoscope_core.compensation.law_in_force import LawInForce, Selection
 from endoscope_core.control import Feedforward, FeedforwardSettings, MotorLimits, PhysicalParameters
@@ -22,7 +22,7 @@ from endoscope_nodes.client.calibration_result import (
     refused_result,
     successful_result,
 )
-from endoscope_nodes.client.order_feedback import feedback_message, feedback_of
+from endoscope_nodes.client.graph_listener import feedback_message, feedback_of
 from endoscope_nodes.client.plant_adoption import AdoptionRequest, PlantInForce, Reach
 from endoscope_nodes.runtime.diagnostics import OK, diagnostic_array, status
 

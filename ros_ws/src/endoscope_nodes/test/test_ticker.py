@@ -5,7 +5,7 @@ from rclpy.context import Context
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 
-from endoscope_bags.cdr_encoding import encode_clock
+from endoscope_bags.cdr import encode_clock
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import LOCK_STEP

@@ -10,7 +10,7 @@ from endoscope_core.choices import WAIVABLE
 from endoscope_explain.options import Options
 
 if TYPE_CHECKING:
-    from endoscope_bags.dataset_card import ChannelDelay
+    from endoscope_bags.lerobot_dataset import ChannelDelay
 
 MOST_FPS = 1000
 
@@ -150,10 +150,9 @@ def _add_export(actions: argparse._SubParsersAction) -> None:
 def _export(args: argparse.Namespace) -> int:
     """Write the data set; return 0."""
     from endoscope_bags import open_bag
-    from endoscope_bags.dataset_card import dataset_card
     from endoscope_bags.episode import channels_of, episodes_of, refuse_other_channels
-    from endoscope_bags.lerobot_dataset import lerobot_dataset, write_lerobot
-    from endoscope_bags.rig_kind import kind_of_bag
+    from endoscope_bags.lerobot_dataset import dataset_card, lerobot_dataset, write_lerobot
+    from endoscope_bags.recording import kind_of_bag
     from endoscope_core.atomic_output import require_free_directory
     from endoscope_core.rig import kind_of_several
 

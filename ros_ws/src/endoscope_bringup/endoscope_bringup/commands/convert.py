@@ -71,8 +71,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _propose(args: argparse.Namespace) -> int:
-    from endoscope_bags.delimited_text import read_table
-    from endoscope_bags.mapping_skeleton import described_table
+    from endoscope_bags.delimited_text import described_table, read_table
     from endoscope_core.atomic_output import write_text
 
     if args.out is not None:

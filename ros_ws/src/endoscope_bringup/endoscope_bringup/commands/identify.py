@@ -11,7 +11,7 @@ from endoscope_core.errors import FileError
 
 if TYPE_CHECKING:
     from endoscope_bags import Recording
-    from endoscope_core.hysteresis.inverse import HysteresisParameters
+    from endoscope_core.hysteresis import HysteresisParameters
     from endoscope_core.identification import HysteresisRecording, UpdatedTable
 
 MODELS = (*HYSTERESIS_MODELS, PHYSICAL)

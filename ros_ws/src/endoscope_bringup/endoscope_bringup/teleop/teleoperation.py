@@ -12,7 +12,7 @@ from sensor_msgs.msg import JointState
 from endoscope_bags.errors import MalformedMessageError
 from endoscope_bringup.teleop.keyboard_handle import KeyboardHandle, Request, Turn
 from endoscope_bringup.teleop.terminal import Terminal, TerminalLostError
-from endoscope_core.calibration.order_feedback import HOME, OrderState
+from endoscope_core.calibration.calibration_run import HOME, OrderState
 from endoscope_core.choices import FOLLOW_THE_HANDLE, PLAYS
 from endoscope_core.errors import printable
 from endoscope_nodes.client.graph_client import GraphClient

@@ -84,12 +84,10 @@ def encode_telemetry(
     wanted: ArrayLike,
     actual: ArrayLike,
 ) -> bytes:
-    """Write one picture of the slave: kind, version, N, seq, stamp, age, ranges, two polylines.
+    """Write one picture of the slave: stamp and age in s, ranges (N, 3), two polylines in m.
 
-    `stamp_s` is the time of the graph, `age_s` that of the newest sample; `ranges` (N, 3) are the
-    smallest, largest and last value of each signal since the frame before; `wanted` and `actual`
-    (`POINTS`, 3) are the bending section in m, as commanded and as measured. NaN where nothing came
-    or is known.
+    `ranges` are the smallest, largest and last value of each signal since the frame before; the
+    (`POINTS`, 3) the section as commanded and as measured. NaN where nothing is known.
     """
     of_signals, *lines = (np.asarray(array, dtype=_F32) for array in (ranges, wanted, actual))
     if of_signals.ndim != 2 or of_signals.shape[1] != 3:

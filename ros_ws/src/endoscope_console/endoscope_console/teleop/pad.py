@@ -16,13 +16,9 @@ SPEEDS = (0.5, 1.0)
 class PadHandle:
     """A handle whose angles follow a deflection or a drag while the clutch is held.
 
-    In speed mode the angles run, and do not wind up where the slave goes no further
-    (:class:`RunningAngles`).  In position mode they follow what was dragged since the grip began,
-    each frame over the 20 ms to the next one: the 50 steps a second of a page would be spikes of
-    speed at 1 kHz.  At release they stay, and the next grip begins there.
-
-    `speeds` (J, 2) are in rad/s at full deflection, with the usual and with the fast dead-man;
-    `limits` (J,) the greatest in rad/s at which the angles follow a drag.
+    In speed mode the angles run (:class:`RunningAngles`). In position mode each frame is followed
+    over the 20 ms to the next: 50 steps a second would be spikes of speed at 1 kHz. `speeds` (J, 2)
+    are in rad/s at full deflection, usual and fast, `limits` (J,) in rad/s those of a drag.
     """
 
     def __init__(
@@ -46,10 +42,10 @@ class PadHandle:
         wanted: Sequence[float] | None = None,
         scale: float = 1.0,
     ) -> tuple[float, ...]:
-        """Angles (J,) of the handle in rad; to be called at each beat.
+        """Angles (J,) in rad at this beat, by the newest frame of the grip that is engaged.
 
-        `frame` is the newest one of the grip that is engaged; `wanted` (J,) what the master asks
-        of the slave now, in rad; `scale` the slave's motion for one radian of the handle.
+        `wanted` (J,) is what the master asks of the slave, in rad; `scale` the slave's motion for
+        one radian of the handle.
         """
         elapsed_ns = 0 if self._followed_ns is None else now_ns - self._followed_ns
         elapsed_ns = min(max(0, elapsed_ns), _LONGEST_NS)

@@ -1,9 +1,6 @@
 """The procedure by which the tube's hysteresis class is found."""
 
-from endoscope_core.calibration.calibration_run import (
-    CalibrationRun,
-    CalibrationStep,
-)
+from endoscope_core.calibration.calibration_run import CalibrationRun, CalibrationStep
 from endoscope_core.calibration.records import (
     BendingRecord,
     TensionGapError,

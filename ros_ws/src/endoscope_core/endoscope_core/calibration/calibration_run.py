@@ -1,4 +1,4 @@
-"""The steps of one calibration: back to zero, rest, sinusoid, verdict."""
+"""The steps of one calibration: back to zero, rest, sinusoid, verdict; how an order of it fares."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,8 +9,48 @@ import numpy as np
 from endoscope_core.calibration.records import TensionRecord
 from endoscope_core.signals import CalibrationMotion, both_joints, calibration_motion, move
 
+CALIBRATE, HOME = 'calibrate', 'home'
 # A minimum-jerk move peaks at 1.875 times its mean speed.
 _PEAK_OF_MEAN = 1.875
+
+
+class OrderState(StrEnum):
+    """As the states of a ROS action's goal are called, and `WAITING` before the first order."""
+
+    WAITING = 'waiting'
+    EXECUTING = 'executing'
+    SUCCEEDED = 'succeeded'
+    ABORTED = 'aborted'
+    REJECTED = 'rejected'
+
+
+class OrderCode(StrEnum):
+    """Why an order was rejected or aborted."""
+
+    NONE = ''
+    BUSY = 'busy'
+    BEYOND_REACH = 'beyond_reach'
+    NO_SESSION = 'no_session'
+    SESSION_ENDED = 'session_ended'
+    TENSION_CEILING = 'tension_ceiling'
+    STREAM_SILENT = 'stream_silent'
+    TENSION_GAP = 'tension_gap'
+    UNKNOWN_TUBE = 'unknown_tube'
+    NOT_JUDGED = 'not_judged'
+    NOT_REACHED = 'not_reached'
+
+
+@dataclass(frozen=True)
+class OrderFeedback:
+    """How an order fares; its progress is relative, from 0 to 1."""
+
+    order: str = ''  # `CALIBRATE` or `HOME`; empty before the first
+    id: int = 0  # unique: the time in ns at which it was given, or just after it
+    state: OrderState = OrderState.WAITING
+    phase: str = ''  # what is done for it now
+    progress: float = 0.0
+    code: OrderCode = OrderCode.NONE  # why it was rejected or aborted
+    words: str = ''  # the same for a person
 
 
 class CalibrationStep(StrEnum):

@@ -92,7 +92,8 @@ class TensionRecord:
                 f'{np.sum(intervals[:longest]) * 1e-9:.3f} s on; at most '
                 f'{self._longest_gap_ns * 1e-6:.0f} ms can be bridged'
             )
-        interval = self._mean_interval(intervals)
+        # Of that in which an instant lies on average.
+        interval = float(np.sum(intervals.astype(float) ** 2) / np.sum(intervals))
         if interval > LONGEST_INTERVAL_NS:
             raise TensionGapError(
                 f'tensions came {interval * 1e-6:.1f} ms apart; at most '
@@ -108,12 +109,6 @@ class TensionRecord:
         stamps = self._stamps[: self._count]
         inside = stamps[(stamps > self.start_ns) & (stamps < self._end_ns)]
         return np.diff(np.concatenate(([self.start_ns], inside, [self._end_ns])))
-
-    @staticmethod
-    def _mean_interval(intervals: NDArray[np.int64]) -> float:
-        """Length in ns of the interval in which an instant lies on average."""
-        lengths = intervals.astype(float)
-        return float(np.sum(lengths**2) / np.sum(lengths))
 
 
 class BendingRecord:

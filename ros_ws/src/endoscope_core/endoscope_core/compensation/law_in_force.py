@@ -30,10 +30,7 @@ class BeforeAdoption:
 
 
 class LawInForce:
-    """A feed-forward, and what its law follows from; nothing is compensated where that is lacking.
-
-    What the first command would wait for is loaded at once.
-    """
+    """A feed-forward, loaded at once, and what its law follows from; none where that is lacking."""
 
     def __init__(self, feedforward: Feedforward, choice: LawChoice, selection: Selection) -> None:
         self.feedforward = feedforward

@@ -2,21 +2,19 @@
 
 from endoscope_core.choices import ADAPTIVE_PHYSICAL, MODES
 from endoscope_core.control.adaptive_backlash import AdaptiveBacklashSettings
-from endoscope_core.control.adopted_plant import (
-    AdoptedPlant,
-    AdoptionError,
-    adopted_plant,
-    plant_hash,
-)
-from endoscope_core.control.corrections import Corrections
+from endoscope_core.control.adopted_plant import AdoptedPlant, AdoptionError, adopted_plant
 from endoscope_core.control.desired_motion import DesiredMotion
 from endoscope_core.control.feedforward import Feedforward, FeedforwardLaw, FeedforwardSettings
-from endoscope_core.control.handle import Handle, HandleRefusal, HandleSettings
+from endoscope_core.control.handle import Handle, HandleRefusal
 from endoscope_core.control.internal_model import PhysicalParameters, bending_range
 from endoscope_core.control.limits import MotorLimits
 from endoscope_core.control.physical_inverse import PhysicalInverse
 from endoscope_core.control.plant_learning import PlantLearning
-from endoscope_core.control.tracker_feedback import AdaptiveBacklashController, TrackerMeasurement
+from endoscope_core.control.tracker_feedback import (
+    AdaptiveBacklashController,
+    Corrections,
+    TrackerMeasurement,
+)
 
 __all__ = [
     'ADAPTIVE_PHYSICAL',
@@ -32,7 +30,6 @@ __all__ = [
     'FeedforwardSettings',
     'Handle',
     'HandleRefusal',
-    'HandleSettings',
     'MotorLimits',
     'PhysicalInverse',
     'PhysicalParameters',
@@ -40,5 +37,4 @@ __all__ = [
     'TrackerMeasurement',
     'adopted_plant',
     'bending_range',
-    'plant_hash',
 ]

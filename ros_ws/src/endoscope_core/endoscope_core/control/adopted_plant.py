@@ -27,7 +27,7 @@ from endoscope_core.control.internal_model import (
 from endoscope_core.control.limits import MotorLimits
 from endoscope_core.errors import EndoscopeError, FileError
 from endoscope_core.physics.description import EffectSpec, PlantDescription
-from endoscope_core.physics.effect import Effect, Stage
+from endoscope_core.physics.effect import Stage
 from endoscope_core.physics.packing import without_functions
 from endoscope_core.physics.plant_file import plant_from_mapping
 from endoscope_core.physics.simulator import TICK, simulate
@@ -67,7 +67,7 @@ class AdoptedPlant:
     @property
     def hash(self) -> str:
         """The first 12 hexadecimal digits of the SHA-256 of the text."""
-        return plant_hash(self.text)
+        return digest(self.text)[:12]
 
     @property
     def law(self) -> FeedforwardLaw:
@@ -85,24 +85,8 @@ class AdoptedPlant:
                 )
 
 
-def plant_hash(text: str) -> str:
-    """The first 12 hexadecimal digits of the SHA-256 of a plant file's text."""
-    return digest(text)[:12]
-
-
-def is_inverted(effect: Effect) -> bool:
-    """Whether an inverse can know it: it acts between motor and tip, at any time alike."""
-    return effect.stage in _INVERTED and not effect.traits.depends_on_time
-
-
 def adopted_plant(text: str, rig: Rig, joints: tuple[str, ...]) -> AdoptedPlant:
-    """Read a plant file of these joints and try its inverse; it takes some seconds.
-
-    Raises
-    ------
-    AdoptionError
-        If the text is no plant file, is of other joints, or cannot be inverted.
-    """
+    """Read a plant file and try its inverse, for some seconds; AdoptionError if that is no good."""
     plant = _read(text)
     if plant.joint_names() != joints:
         raise AdoptionError(
@@ -161,7 +145,8 @@ def _knowable(plant: PlantDescription) -> tuple[PlantDescription, tuple[str, ...
     inverted, left_out = plant, []
     for entry in added_to(plant):
         known = definition_of(entry)
-        if is_inverted(known):
+        # What acts between motor and tip, at any time alike, an inverse can know.
+        if known.stage in _INVERTED and not known.traits.depends_on_time:
             continue
         if known.stage in _INVERTED:
             left_out.append(f'{known.id} of {entry.joint}')

@@ -12,16 +12,11 @@ from numpy.typing import NDArray
 
 from endoscope_core.choices import ADAPTIVE_PHYSICAL, MODES, PHYSICAL
 from endoscope_core.control.internal_model import PhysicalParameters
-from endoscope_core.control.limits import (
-    COUNT,
-    MotorLimits,
-    Play,
-    limited,
-    worked_off,
-)
+from endoscope_core.control.limits import COUNT, MotorLimits, Play, limited, worked_off
 from endoscope_core.control.physical_inverse import AdaptivePhysicalInverse, PhysicalInverse
+from endoscope_core.hysteresis import MODELS, HysteresisParameters
 from endoscope_core.hysteresis.dahl import dahl_step
-from endoscope_core.hysteresis.inverse import MODELS, DirectInverse, HysteresisParameters
+from endoscope_core.hysteresis.memory_model import DirectInverse
 
 Vector = Sequence[float] | NDArray[np.float64]
 LawParameters = HysteresisParameters | PhysicalParameters
@@ -102,11 +97,6 @@ class HysteresisInverse:
         """Nothing depends on it."""
 
 
-def parameters_of(mode: str) -> type[LawParameters]:
-    """Kind of parameters that a mode other than 'none' works with."""
-    return PhysicalParameters if mode in (PHYSICAL, ADAPTIVE_PHYSICAL) else MODELS[mode]
-
-
 @dataclass(frozen=True)
 class FeedforwardLaw:
     """What the compensator does with a desired angle.
@@ -130,7 +120,8 @@ class FeedforwardLaw:
             return
         if not self.parameters:
             raise ValueError(f'mode {self.mode!r} needs parameters for each joint: calibrate first')
-        kind = parameters_of(self.mode)
+        physical = self.mode in (PHYSICAL, ADAPTIVE_PHYSICAL)
+        kind = PhysicalParameters if physical else MODELS[self.mode]
         for given in self.parameters:
             if not isinstance(given, kind):
                 raise ValueError(

@@ -52,10 +52,7 @@ class MotionSource(ABC):
 
 
 class PlayedMotion(MotionSource):
-    """A motion that is approached, goes on where it stood still, and is held at its end.
-
-    `speed` is the largest of the approach in rad/s; with `hold` it waits for the clutch.
-    """
+    """A motion, approached at up to `speed` rad/s, held at its end; with `hold` by the clutch."""
 
     def __init__(
         self, limits: MotionLimits, motion: SampledMotion, speed: float, hold: bool
@@ -133,10 +130,7 @@ class FollowedHandle(MotionSource):
 
 
 class CommandedVelocity(MotionSource):
-    """Velocities from where the slave is, which another program commands with the clutch held.
-
-    They are braked before the end of the range: `cut` only counts and reports that.
-    """
+    """Velocities of another program with the clutch held, braked before the range ends."""
 
     def __init__(self, limits: MotionLimits, stream: VelocityStream, cut: RangeCut) -> None:
         super().__init__(limits)
@@ -176,8 +170,7 @@ def _gone(angles: Angles, speeds: Angles, seconds: float) -> Angles:
 class MasterMotion:
     """Desired bending of J joints by one source or none, from the measured pose on.
 
-    It keeps to the bounds of the rig and, as far as they are known, to those of the tube.
-    `bending` gives the measured pose (J,) in rad, or None. Times are local and monotonic, in ns.
+    It keeps to the rig and, as far as that is known, to the tube. Times are steady, in ns.
     """
 
     def __init__(self, rig: Rig, bending: Callable[[], Angles | None]) -> None:
@@ -269,11 +262,7 @@ class MasterMotion:
     def next(
         self, tick_ns: int, now_ns: int, periods: int, *, held: bool, free: bool
     ) -> Desired | None:
-        """Where the slave is to be at a tick, `periods` ms after the last; None: nowhere.
-
-        To be called at every tick. `held` says whether the clutch is, `free` whether anybody may
-        move the slave.
-        """
+        """Where to be at a tick, `periods` ms after the last; None: nowhere, as if not `free`."""
         followed, source = self.handle.follow(tick_ns), self.source
         if source is None or not (free and source.follows(held)):
             if self.moving or self.velocities.is_fresh(now_ns):

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import math
 
-from endoscope_core.control.internal_model import (
-    InternalModel,
-    PhysicalParameters,
-    TurningPoints,
-)
+from endoscope_core.control.internal_model import InternalModel, PhysicalParameters, TurningPoints
 from endoscope_core.control.limits import COUNT, MotorLimits
 from endoscope_core.control.plant_learning import PlantLearning
 

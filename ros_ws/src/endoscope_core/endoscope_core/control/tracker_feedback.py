@@ -11,10 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from endoscope_core.control.adaptive_backlash import (
-    AdaptiveBacklashJoint,
-    AdaptiveBacklashSettings,
-)
+from endoscope_core.control.adaptive_backlash import AdaptiveBacklashJoint, AdaptiveBacklashSettings
 from endoscope_core.control.limits import SHARE_OF_TRAVEL, Play, limited, worked_off
 from endoscope_core.hysteresis.bouc_wen import bouc_wen_normalised_step
 
@@ -195,9 +192,9 @@ class AdaptiveBacklashController:
             self._plays = [Play(0.5 * self.settings.dead_band, a) for a in ahead]
         foreseen = tuple(play.follow(a) for play, a in zip(self._plays, ahead, strict=True))
         if self._history:
-            last = self._history[-1]
+            last, travel = self._history[-1], self.settings.direction_travel
             direction = tuple(
-                direction_step(self.settings.direction_travel, s, new - old)
+                float(bouc_wen_normalised_step(s, new - old, travel, 0.0, 1.0))
                 for s, new, old in zip(last.direction, foreseen, last.foreseen, strict=True)
             )
         else:
@@ -250,6 +247,28 @@ class AdaptiveBacklashController:
         return numbers
 
 
-def direction_step(travel: float, direction: float, delta: float) -> float:
-    """Direction memory in [-1, 1] after the desired angle has moved by `delta` rad."""
-    return float(bouc_wen_normalised_step(direction, delta, travel, 0.0, 1.0))
+class Corrections:
+    """The two newest corrections (J,) in rad; which one a command gets must not depend on chance.
+
+    `fresh_ns` is how old one may be that is still added to a command.
+    """
+
+    def __init__(self, fresh_ns: int) -> None:
+        self._fresh_ns = fresh_ns
+        self._newest: tuple[tuple[int, tuple[float, ...]], ...] = ()
+
+    def restart(self) -> None:
+        """Forget them."""
+        self._newest = ()
+
+    def add(self, stamp_ns: int, angles: tuple[float, ...]) -> None:
+        """Take the next one."""
+        self._newest = (*self._newest[-1:], (stamp_ns, angles))
+
+    def before(self, stamp_ns: int) -> NDArray[np.float64] | None:
+        """The newest one from before a command of this stamp, unless it is too old."""
+        for corrected_ns, angles in reversed(self._newest):
+            if corrected_ns < stamp_ns:
+                fresh = stamp_ns - corrected_ns <= self._fresh_ns
+                return np.array(angles) if fresh else None
+        return None

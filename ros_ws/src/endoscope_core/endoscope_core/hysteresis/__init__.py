@@ -5,3 +5,11 @@ from endoscope_core.hysteresis.dahl import DahlParameters
 from endoscope_core.hysteresis.memory_model import direct_inverse, forward
 
 __all__ = ['BoucWenParameters', 'DahlParameters', 'direct_inverse', 'forward']
+
+HysteresisParameters = BoucWenParameters | DahlParameters
+
+MODELS: dict[str, type[HysteresisParameters]] = {
+    'bouc_wen': BoucWenParameters,
+    'dahl': DahlParameters,
+}
+"""Every model by the name that commands and node parameters use."""

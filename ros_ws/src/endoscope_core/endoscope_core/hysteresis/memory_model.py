@@ -135,3 +135,25 @@ def _series(values: ArrayLike) -> NDArray[np.float64]:
             f'its shape is {series.shape}'
         )
     return series
+
+
+class DirectInverse:
+    """Inverse of a model with one memory, which the desired angle drives.
+
+    It begins with a memory `direction` in [-1, 1] and a desired `angle` in rad.
+    """
+
+    def __init__(self, model: MemoryModel, direction: float, angle: float) -> None:
+        self._model = model
+        self.direction = min(1.0, max(-1.0, direction))  # that the motion has taken, in [-1, 1]
+        self._angle = angle
+
+    def command(self) -> float:
+        """``(theta_d - offset + lag y) / alpha`` in rad, equation 5 of the first paper."""
+        model = self._model
+        return (self._angle - model.offset + model.lag * self.direction) / model.alpha
+
+    def move_to(self, angle: float) -> None:
+        """Follow the desired angle to `angle` rad, monotonically."""
+        self.direction = self._model.memory_step(self.direction, angle - self._angle)
+        self._angle = angle

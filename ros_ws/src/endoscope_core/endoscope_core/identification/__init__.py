@@ -1,26 +1,20 @@
 """Parameters of hysteresis models from recordings."""
 
-from endoscope_core.identification.class_parameters import (
-    load_class_parameters,
-    parameters_for_class,
-)
-from endoscope_core.identification.feedforward_fit import FeedforwardFit, Servo, fit_feedforward
-from endoscope_core.identification.hysteresis_fit import HysteresisRecording, ModelFit, fit_model
+from endoscope_core.identification.feedforward_fit import Servo, fit_feedforward
+from endoscope_core.identification.hysteresis_fit import HysteresisRecording, fit_model
 from endoscope_core.identification.plant_fit import PlantFit, PlantFitError, fit_plant
 from endoscope_core.identification.updated_table import (
     KINDS,
-    LawParameters,
     TableEntry,
     UpdatedTable,
     blend,
+    load_class_parameters,
+    parameters_for_class,
 )
 
 __all__ = [
     'KINDS',
-    'FeedforwardFit',
     'HysteresisRecording',
-    'LawParameters',
-    'ModelFit',
     'PlantFit',
     'PlantFitError',
     'Servo',

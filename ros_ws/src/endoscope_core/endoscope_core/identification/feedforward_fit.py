@@ -18,10 +18,10 @@ from scipy.optimize import differential_evolution
 from endoscope_core.hysteresis import (
     BoucWenParameters,
     DahlParameters,
+    HysteresisParameters,
     direct_inverse,
     forward,
 )
-from endoscope_core.hysteresis.inverse import HysteresisParameters
 from endoscope_core.hysteresis.memory_model import (
     GREATEST_ALPHA,
     GREATEST_INVERSE_SLOPE,

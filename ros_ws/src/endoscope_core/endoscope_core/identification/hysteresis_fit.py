@@ -14,10 +14,14 @@ from numpy.typing import NDArray
 from scipy.optimize import differential_evolution, lsq_linear
 
 from endoscope_core.errors import InputError
-from endoscope_core.hysteresis import BoucWenParameters, DahlParameters, forward
+from endoscope_core.hysteresis import (
+    BoucWenParameters,
+    DahlParameters,
+    HysteresisParameters,
+    forward,
+)
 from endoscope_core.hysteresis.bouc_wen import bouc_wen_path
 from endoscope_core.hysteresis.dahl import dahl_path
-from endoscope_core.hysteresis.inverse import HysteresisParameters
 from endoscope_core.hysteresis.memory_model import (
     GREATEST_ALPHA,
     GREATEST_INVERSE_SLOPE,

@@ -17,11 +17,12 @@ from endoscope_core.choices import (
 )
 from endoscope_core.control import FeedforwardLaw, PhysicalParameters
 from endoscope_core.errors import FileError, InputError
-from endoscope_core.identification.class_parameters import (
+from endoscope_core.identification.updated_table import (
+    LawParameters,
+    UpdatedTable,
     load_class_parameters,
     parameters_for_class,
 )
-from endoscope_core.identification.updated_table import LawParameters, UpdatedTable
 from endoscope_core.safety import BendingRange
 
 
@@ -43,11 +44,7 @@ class CalibrationFindings:
 
 
 class LawChoice:
-    """Finds the parameters of a mode, and keeps the files that it has read.
-
-    Without a file of `parameter_sets`, classes have those that come with the project; without a
-    `table`, the updated table is made of the class parameters.
-    """
+    """Finds the parameters of a mode, by default the shipped ones, and keeps the files it read."""
 
     def __init__(self, joints: int, parameter_sets: str = '', table: str = '') -> None:
         self._joints = joints
@@ -63,13 +60,11 @@ class LawChoice:
         findings: CalibrationFindings,
         adopted: tuple[PhysicalParameters, ...] = (),
     ) -> FeedforwardLaw:
-        """The law of a mode (one of `endoscope_core.control.MODES`) after a calibration.
+        """The law of a mode after a calibration.
 
-        By 'class' it takes the class's set (first paper), by 'size' it blends the updated table at
-        the regressed backlash size, by 'plant' it takes the plant that the calibration identified,
-        by 'adopted' the one of the plant file that was put into force, for each joint.
-        InputError if something is needed and was not found, since nothing is guessed; FileError if
-        a file cannot be used.
+        By 'class' it takes the class's set (first paper), by 'size' the updated table at the
+        regressed backlash size, by 'plant' and by 'adopted' a plant of each joint. InputError if
+        something needed was not found, since nothing is guessed; FileError for a bad file.
         """
         if mode == 'none':
             return FeedforwardLaw()

@@ -230,13 +230,11 @@ def plants_of_calibration(
 def fits_of_calibration(
     command: ArrayLike, tension: ArrayLike, gear: float
 ) -> tuple[PlantFit, ...]:
-    """Fits of all joints to a calibration, the joints side by side.
+    """Fits of all joints, side by side, to a calibration; PlantFitError if it shows no plant.
 
-    All have the same joint-equivalent motor command (N,) in rad at 1 kHz; `gear` is the shaft's
-    angle for one radian at the joint. Tensions (N, 2 J) in N are of the positive and the negative
-    wire of each joint in turn. Where friction lets the joint go to one side only a little, the way
-    to the other shows where it rests: a motion to one side and back shows a tight tube's reach
-    worse than one to both. A PlantFitError if the recording shows no plant.
+    The joint-equivalent command (N,) is in rad at 1 kHz, `gear` the shaft's angle for a radian of
+    it; tensions (N, 2 J) in N are of the two wires of each joint in turn. Where friction lets the
+    joint go to one side only a little, the way to the other shows where it rests.
     """
     u = np.asarray(command, dtype=float)
     wires = np.asarray(tension, dtype=float)
@@ -248,10 +246,7 @@ def fits_of_calibration(
 
 
 def size_of_explained(fits: Sequence[PlantFit], gear: float) -> float | None:
-    """Backlash size in rad under the calibration sinusoid, mean of the joints, by their plants.
-
-    None where a plant leaves more of the tensions than the fit takes for noise, or has no loop.
-    """
+    """Mean backlash size in rad by plants; None where one leaves more than noise, or no loop."""
     if any(fit.tension_rmse > TENSION_SCALE for fit in fits):
         return None
     motion = calibration_motion()

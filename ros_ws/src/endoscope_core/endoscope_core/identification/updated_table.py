@@ -1,4 +1,4 @@
-"""Parameters over the backlash size, and parameters between two sets."""
+"""Parameters by class and over the backlash size, and parameters between two sets."""
 
 from __future__ import annotations
 
@@ -17,8 +17,7 @@ from endoscope_core.choices import PHYSICAL
 from endoscope_core.control.feedforward import LawParameters
 from endoscope_core.control.internal_model import PhysicalParameters
 from endoscope_core.errors import FileError, InputError
-from endoscope_core.hysteresis import BoucWenParameters, DahlParameters
-from endoscope_core.hysteresis.inverse import MODELS
+from endoscope_core.hysteresis import MODELS, BoucWenParameters, DahlParameters
 from endoscope_core.physics import JointParameters
 from endoscope_core.physics.family import SIGNED
 from endoscope_core.physics.layout import NOMINAL_KEYS
@@ -248,3 +247,58 @@ def shipped_table_path(model: str) -> Path:
     """Where the class parameters of a model lie that come with this package."""
     name = f'{model}_classes.json'
     return Path(str(files('endoscope_core.identification') / 'parameters' / name))
+
+
+def load_class_parameters(
+    path: str | Path | None = None, model: str = 'bouc_wen'
+) -> dict[int, LawParameters]:
+    """Feed-forward parameters of a model by class (backlash size in deg); the shipped by default.
+
+    FileError if the file is missing, holds something else or another model, or unsafe parameters.
+    """
+    path = shipped_table_path(model) if path is None else Path(path)
+    if not path.is_file():
+        raise FileError(
+            f'{path} is missing: make parameter sets with `endoscope fit classes DATASET '
+            f'--model {model}`'
+        )
+    try:
+        file = read(_ClassesFile, json.loads(path.read_text(encoding='utf-8')), path.name)
+        sets = file.classes if file.model == model else {}
+        parameters = {
+            int(class_deg): parameters_from_dict(model, found.feedforward)
+            for class_deg, found in sets.items()
+        }
+    except (ValueError, TypeError, RecursionError) as error:
+        raise FileError(f'{path} holds no {model} parameter sets: {error}') from error
+    if file.model != model:
+        raise FileError(f'{path} holds parameters of {file.model}, not of {model}')
+    return parameters
+
+
+@dataclass(frozen=True)
+class _Class:
+    feedforward: Mapping[str, Any]
+    model: Any = None
+    model_rmse: Any = None
+
+
+@dataclass(frozen=True)
+class _ClassesFile:
+    model: str
+    classes: Mapping[str, _Class]
+    schema: Any = 1
+    command: Any = None
+    dataset_manifest_sha256: Any = None
+    lead: Any = None
+
+
+def parameters_for_class(sets: Mapping[int, LawParameters], class_deg: int) -> LawParameters:
+    """The set of a class.
+
+    InputError if there is none: parameters are never guessed.
+    """
+    if class_deg not in sets:
+        known = ', '.join(str(c) for c in sorted(sets))
+        raise InputError(f'no parameters for class {class_deg} deg (there are {known})')
+    return sets[class_deg]

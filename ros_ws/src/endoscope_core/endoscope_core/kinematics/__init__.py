@@ -1,10 +1,10 @@
 """From bending angles to the pose of the tip, and back; from a tracker's frame to the base's."""
 
 from endoscope_core.kinematics.constant_curvature import (
-    Hinge,
-    Transform,
+    TipVelocity,
     Vertebrae,
     bending_from_orientation,
+    bending_rate,
     centre_line,
     tip_lever,
     tip_pose,
@@ -15,14 +15,11 @@ from endoscope_core.kinematics.straight_registration import (
     StraightRegistration,
     register_straight,
 )
-from endoscope_core.kinematics.tip_velocity import TipVelocity, bending_rate
 
 __all__ = [
-    'Hinge',
     'RegistrationError',
     'StraightRegistration',
     'TipVelocity',
-    'Transform',
     'Vertebrae',
     'bending_from_orientation',
     'bending_rate',

@@ -1,4 +1,4 @@
-"""Bending section that bends about two axes with constant curvature: tip pose, and vertebrae.
+"""Bending section of constant curvature about two axes: pose and velocity of the tip, vertebrae.
 
 The section is an arc of fixed length whose plane and total angle are given by two bending angles
 (Webster and Jones, Int. J. Robotics Research 29(13), 2010, section 3): the rotation vector of the
@@ -197,3 +197,48 @@ class Vertebrae:
             )
             found.append(Transform(parent, child, (0.0, 0.0, height), rotation))
         return found
+
+
+class TipVelocity(NamedTuple):
+    """Velocity of the tip in its own frame, z along the instrument: m/s and rad/s."""
+
+    linear: Vector
+    angular: Vector
+
+    @property
+    def ignored(self) -> str:
+        """Say what two bending angles cannot follow, or what the angular velocity decides."""
+        turns, moves = any(self.angular[:2]), any(self.linear[:2])
+        parts = {
+            'linear.z': self.linear[2],
+            'angular.z': self.angular[2],
+            'linear.x and linear.y beside angular.x and angular.y': turns and moves,
+        }
+        return ', '.join(part for part, asked in parts.items() if asked)
+
+
+def bending_rate(
+    velocity: TipVelocity, bending: Sequence[float], length: float
+) -> tuple[float, float]:
+    """Rates of ``bend_x`` and ``bend_y`` in rad/s by which the tip has a velocity across its axis.
+
+    Its angular velocity decides; where that is zero, its linear one by the lever of a section of
+    `length` m, bent (2,) in rad. ValueError if it is bent by half a turn or more: no rate turns the
+    tip as asked there.
+    """
+    # The rotation vector r = (-bend_y, bend_x, 0) turns the tip, in its own frame, with J(r) dr/dt,
+    # J being the right Jacobian of SO(3) (Sola, Deray and Atchuthan, A micro Lie theory,
+    # arXiv:1812.01537, appendix B): across the axis dr/dt along r, and sin(a) / a of it across r.
+    x, y = bending
+    angle = math.hypot(x, y)
+    if not angle < math.pi:
+        raise ValueError(f'a bending of {angle:.4g} rad is half a turn or more')
+    turn_x, turn_y = velocity.angular[1], -velocity.angular[0]
+    if not (turn_x or turn_y):
+        lever = tip_lever(bending, length)
+        return velocity.linear[0] / lever, velocity.linear[1] / lever
+    if angle < _SMALL:
+        return turn_x, turn_y
+    stretch = angle / math.sin(angle)
+    radial = (1.0 - stretch) * (turn_x * x + turn_y * y) / angle**2
+    return stretch * turn_x + radial * x, stretch * turn_y + radial * y

@@ -9,11 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_core.monitoring.jump_test import Jumps, JumpTest, ResidualBlock
-from endoscope_core.monitoring.prediction import (
-    JOINT_TICK_S,
-    SERVO_TICK_S,
-    PredictionBank,
-)
+from endoscope_core.monitoring.prediction import JOINT_TICK_S, SERVO_TICK_S, PredictionBank
 from endoscope_core.monitoring.rig_change import CHANGES, DIRECTIONS, DRIFT_S, SMALLEST, Part
 from endoscope_core.monitoring.thresholds import THRESHOLDS
 from endoscope_core.physics.description import PlantDescription
@@ -46,30 +42,15 @@ _PART_OF = np.array([str(change.part) for change in CHANGES])
 
 @dataclass(frozen=True)
 class DetectedChange:
-    """A change that was detected.
-
-    Attributes
-    ----------
-    joint : str
-        Where.
-    at : float
-        When it was detected, s.
-    since : float
-        Onset, by the likeliest window, s.
-    margin : float
-        Largest log-likelihood gain relative to its threshold.
-    parts : tuple of Part
-        Likeliest first; the rest are about as likely. Empty until the change is located.
-    change : str
-        The likeliest one in words.
-    """
+    """A change that was detected; times in s."""
 
     joint: str
-    at: float
-    since: float
-    margin: float
+    at: float  # when it was detected
+    since: float  # onset, by the likeliest window
+    margin: float  # largest log-likelihood gain relative to its threshold
+    # Likeliest first; the rest are about as likely. Empty until the change is located.
     parts: tuple[Part, ...] = ()
-    change: str = ''
+    change: str = ''  # the likeliest one in words
 
     def __str__(self) -> str:
         where = ' or '.join(self.parts) or 'stage not known yet'
@@ -160,18 +141,12 @@ class _Joint:
 
 
 class RigWatch:
-    """Compares a rig with its description while it moves.
+    """Compares a rig with its description of J joints while it moves.
 
     Samples are added to `setpoint` (J columns, rad), `motor` (2 J: shaft angles in rad, then
     efforts in N m), `wires` (2 J: both tensions in N of each joint) and `tracker` (J, rad), in any
     portions; `update` judges what is complete. Wires, tracker and efforts may be missing or NaN.
-
-    Parameters
-    ----------
-    plant : PlantDescription
-        The rig as described, of J joints.
-    thresholds : Mapping[str, float], optional
-        Log-likelihood gain at which a change of each `Part` is reported.
+    `thresholds` are log-likelihood gains at which a change of each `Part` is reported.
     """
 
     def __init__(

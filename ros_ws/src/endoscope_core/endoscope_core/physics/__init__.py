@@ -10,12 +10,7 @@ from endoscope_core.physics.description import (
 from endoscope_core.physics.packing import recording_faults
 from endoscope_core.physics.plant_file import load_plant, save_plant
 from endoscope_core.physics.sensing import SensorModel
-from endoscope_core.physics.simulator import (
-    PlantSample,
-    PlantSimulator,
-    PlantTrajectory,
-    simulate,
-)
+from endoscope_core.physics.simulator import PlantSample, PlantSimulator, PlantTrajectory, simulate
 
 __all__ = [
     'EffectSpec',

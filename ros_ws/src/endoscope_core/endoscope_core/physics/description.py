@@ -78,12 +78,7 @@ class JointParameters:
     qs and qs exp(s). Of the tension T of the wire on the inside of its bend the section lets
     T exp(-section_friction abs(q - section_straight_angle)) act where that wire is pulled, and
     T exp(+...) where it is let go. The wires are tightened at angle zero, where friction holds the
-    joint.
-
-    Raises
-    ------
-    ValueError
-        If a value is not finite, out of its bounds in physics, or the profile has too many terms.
+    joint. ValueError if a value is out of its bounds in physics, or the profile has too many terms.
     """
 
     # fmt: off
@@ -177,10 +172,7 @@ class JointParameters:
 class SensorParameters:
     """Noise (rms), resolution and rate of the sensors of the rig (SI units).
 
-    Raises
-    ------
-    ValueError
-        If a value is not finite, negative, or a rate or count is zero.
+    ValueError if a value is not finite, negative, or a rate or count is zero.
     """
 
     # fmt: off
@@ -236,59 +228,30 @@ NUMBERS: Mapping[str, PlantNumber] = {
 
 @dataclass(frozen=True)
 class EffectSpec:
-    """One physical effect added to the nominal plant.
+    """One physical effect added to the nominal plant, its parameters in SI units."""
 
-    Attributes
-    ----------
-    id : str
-        Name in the catalogue of effects.
-    joint : str
-        The joint it acts on.
-    parameters : Mapping[str, float]
-        Parameters in SI units; those left out take the effect's typical value.
-    """
-
-    id: str
-    joint: str
+    id: str  # in the catalogue of effects
+    joint: str  # that it acts on
+    # In SI units; those left out take the effect's typical value.
     parameters: Mapping[str, Number] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class TermSpec:
-    """A function of one state added to the nominal plant where the catalogue has no effect.
+    """A function of one state added to the nominal plant where the catalogue has no effect."""
 
-    Attributes
-    ----------
-    joint : str
-        The joint it acts on.
-    place : str
-        Name in the table of places.
-    expression : str
-        Formula of the place's symbol, or nothing.
-    values : tuple of float
-        Instead of a formula: the function at equally spaced nodes over the range.
-    range : (float, float), optional
-        Of the argument; beyond it the function keeps its last value, or begins again. That of the
-        place if not given.
-    multiplies : bool
-        Whether it is no term of its own: what other functions add where this one acts is multiplied
-        by one plus this one. Both together are a function of two states.
-    lag_s : float, optional
-        Time constant in s of an argument that lags; that of the place if not given.
-    """
-
-    joint: str
-    place: str
-    expression: str = ''
-    values: tuple[float, ...] = ()
+    joint: str  # that it acts on
+    place: str  # in the table of places
+    expression: str = ''  # formula of the place's symbol, or nothing
+    values: tuple[float, ...] = ()  # instead: at equally spaced nodes over the range
+    # Of the argument, by default the place's; beyond it the function keeps its last value, or
+    # begins again.
     range: tuple[float, float] | None = None
+    # Whether it is no term of its own: what other functions add where this one acts is multiplied
+    # by one plus this one. Both together are a function of two states.
     multiplies: bool = False
+    # Time constant in s of an argument that lags, by default the place's.
     lag_s: float | None = None
-
-
-def joints_of_slave() -> dict[str, JointParameters]:
-    """Both joints of the simulated slave."""
-    return {'bend_x': SLAVE, 'bend_y': SLAVE}
 
 
 @dataclass(frozen=True)
@@ -298,7 +261,10 @@ class PlantDescription:
     `effects` are of the catalogue, `terms` are functions where it has none.
     """
 
-    joints: Mapping[str, JointParameters] = field(default_factory=joints_of_slave)
+    # By default both of the simulated slave.
+    joints: Mapping[str, JointParameters] = field(
+        default_factory=lambda: {'bend_x': SLAVE, 'bend_y': SLAVE}
+    )
     sensors: SensorParameters = field(default_factory=SensorParameters)
     effects: tuple[EffectSpec, ...] = ()
     terms: tuple[TermSpec, ...] = ()
@@ -329,6 +295,6 @@ def _check_numbers(parameters: JointParameters | SensorParameters) -> None:
             raise ValueError(f'{key} is {value}: it must be positive')
 
 
-SLAVE = JointParameters(joint_friction=5.0e-4, section_friction=0.3)
+SLAVE: JointParameters = JointParameters(joint_friction=5.0e-4, section_friction=0.3)
 """A joint of the simulated slave: some of its friction grows with the bend, as on the real
 endoscope. A joint of which nothing is said has none of that."""

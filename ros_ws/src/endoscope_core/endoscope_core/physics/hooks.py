@@ -86,28 +86,7 @@ LOAD_CELL = Hook('load_cell', Fold.THROUGH, 'p, x, reading, cell, neighbour, tim
 ADVANCE = Hook('advance', Fold.CALLS, 'p, x, load_a, load_b, time, tick')
 """End of a tick: lets states follow; `load_a`, `load_b` are the wires' mean tensions in N."""
 
-HOOKS = (
-    COMMAND,
-    SERVO_ERROR,
-    TORQUE,
-    PULLEY_ANGLE,
-    TRAVEL_OF,
-    EXPONENT,
-    DIRECTION,
-    FRICTION_FLOOR,
-    FILM_DRAG,
-    STIFFNESS,
-    LENGTH,
-    JOINT_FRICTION_FACTOR,
-    END_LENGTH,
-    LOAD,
-    TIP_ANGLE,
-    EFFORT,
-    TRACKER,
-    CELL_INPUT,
-    LOAD_CELL,
-    ADVANCE,
-)
+HOOKS = tuple(each for each in vars().values() if isinstance(each, Hook))
 
 Function = Callable[..., Any]
 LINKS: dict[str, list[tuple[Effect, Function]]] = {each.name: [] for each in HOOKS}

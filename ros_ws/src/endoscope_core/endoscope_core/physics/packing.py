@@ -143,13 +143,7 @@ def _check_products(terms: tuple[TermSpec, ...]) -> None:
 
 
 def recording_faults(plant: PlantDescription) -> RecordingFaults:
-    """The faults that a plant's effects give to its recordings.
-
-    Raises
-    ------
-    ValueError
-        If an effect is invalid, or its joints disagree about the tracker's one clock.
-    """
+    """Faults of a plant's recordings; ValueError if joints disagree about the tracker's clock."""
     joints = plant.joint_names()
     parts = []
     for spec in plant.effects:

@@ -101,13 +101,7 @@ class _Plant:
 
 
 def load_plant(path: str | Path) -> PlantDescription:
-    """Read a plant.yaml; missing keys take their nominal values.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be read, is not a plant, or has an unknown key or an invalid value.
-    """
+    """Read a plant.yaml, of nominal values where keys are missing; FileError if it is no plant."""
     try:
         content = load_yaml(path)
     except FileError as error:
@@ -183,13 +177,7 @@ def _term_mapping(term: TermSpec) -> dict[str, Any]:
 
 
 def save_plant(plant: PlantDescription, path: str | Path) -> None:
-    """Write a plant.yaml that `load_plant` reads back to an equal plant.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
+    """Write a plant.yaml that `load_plant` reads back to an equal plant; OSError if it cannot."""
     write_text(path, plant_as_text(plant))
 
 

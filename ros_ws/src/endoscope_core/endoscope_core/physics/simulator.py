@@ -19,29 +19,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PlantSample:
-    """What the noise-free sensors read at one instant, for J joints.
+    """What the noise-free sensors read at one instant, for J joints: s, rad, rad/s, N m and N."""
 
-    Attributes
-    ----------
-    time : float
-        Seconds since the start.
-    shaft_position, shaft_velocity, shaft_effort : array (J,)
-        Motor shaft in rad, rad/s and N m.
-    tension : array (J, 2)
-        Load cells of the positive and the negative wire in N.
-    bending : array (J,)
-        Bending angle in rad as the tracker reads it.
-    bending_true : array (J,)
-        Bending angle in rad of the joint itself.
-    """
-
-    time: float
+    time: float  # s since the start
+    # Of the motor, (J,), in rad, rad/s and N m.
     shaft_position: Array
     shaft_velocity: Array
     shaft_effort: Array
-    tension: Array
-    bending: Array
-    bending_true: Array
+    tension: Array  # (J, 2), load cells of the positive and the negative wire, N
+    bending: Array  # (J,), rad, as the tracker reads it
+    bending_true: Array  # (J,), rad, of the joint itself
 
 
 @dataclass(frozen=True)
@@ -61,20 +48,7 @@ class PlantTrajectory:
 
 
 class PlantSimulator:
-    """A rig that is advanced tick by tick.
-
-    Parameters
-    ----------
-    plant : PlantDescription
-        The rig, with its effects.
-    tick : float
-        Control period in s.
-
-    Raises
-    ------
-    ValueError
-        If the plant names an unknown effect, joint or parameter, or one out of bounds.
-    """
+    """A rig that is advanced by ticks of `tick` s; ValueError if the plant is not valid."""
 
     def __init__(self, plant: PlantDescription, tick: float = TICK) -> None:
         self.joints = plant.joint_names()
@@ -101,25 +75,10 @@ class PlantSimulator:
         )
 
     def advance(self, shaft_command: ArrayLike, n_ticks: int = 1) -> PlantSample:
-        """Hold a command for some ticks.
+        """Hold a command (J,) in rad of the shafts for some ticks, and read at their end.
 
-        Parameters
-        ----------
-        shaft_command : array (J,)
-            Motor shaft angle in rad.
-        n_ticks : int
-            How long it is held.
-
-        Returns
-        -------
-        PlantSample
-            At the end of the ticks.
-
-        Raises
-        ------
-        ValueError
-            If the command has another shape, is not finite or beyond `LARGEST_COMMAND`; the plant
-            stays as it was.
+        ValueError if it has another shape, is not finite or beyond `LARGEST_COMMAND`; the plant
+        stays as it was.
         """
         command = np.asarray(shaft_command, dtype=float)
         if command.shape != (len(self.joints),):
@@ -149,27 +108,11 @@ def simulate(
     tick: float = TICK,
     start_shaft: ArrayLike | None = None,
 ) -> PlantTrajectory:
-    """Answer of a rig, at rest at first, to a whole command.
+    """Answer of a rig of J joints, at rest at first, to a whole command, by ticks of `tick` s.
 
-    Parameters
-    ----------
-    plant : PlantDescription
-        Its J joints.
-    shaft_command : array (N, J)
-        Motor shaft angle in rad, command k in force from tick k to tick k + 1.
-    tick : float
-        In s.
-    start_shaft : array (J,), optional
-        Shaft angle in rad where the rig rests before the first command; zero if not given.
-
-    Returns
-    -------
-    PlantTrajectory
-
-    Raises
-    ------
-    ValueError
-        If the command has the wrong shape or is not finite, or the plant is invalid.
+    Command k of shaft angles (N, J) in rad is in force from tick k to tick k + 1; `start_shaft`
+    (J,) in rad is where the rig rests before, by default at zero. ValueError if the command has
+    another shape or is not finite, or the plant is not valid.
     """
     command = np.asarray(shaft_command, dtype=float)
     joints = len(plant.joints)

@@ -12,7 +12,6 @@ from endoscope_core.signals.calibration_motion import (
 from endoscope_core.signals.motions import (
     MOTIONS,
     both_joints,
-    commissioning_motion,
     motion_by_name,
     non_periodic_signal,
     periodic_signal,
@@ -34,7 +33,6 @@ __all__ = [
     'both_joints',
     'calibration_motion',
     'calibration_sinusoid',
-    'commissioning_motion',
     'hold',
     'motion_by_name',
     'move',

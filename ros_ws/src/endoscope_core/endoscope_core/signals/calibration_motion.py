@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,6 +99,16 @@ def brief_calibration() -> Signal:
     )
 
 
+def named[T](name: str, known: Mapping[str, T], what: str) -> T:
+    """The motion of a name; InputError, with the nearest, if there is none."""
+    if name not in known:
+        near = difflib.get_close_matches(name, known, n=1, cutoff=0.0)
+        raise InputError(
+            f'unknown {what} {name!r}, nearest is {near[0]!r} (known: {", ".join(known)})'
+        )
+    return known[name]
+
+
 @dataclass(frozen=True)
 class CalibrationMotion:
     """Motion of a calibration, and the length of its record."""
@@ -130,11 +140,5 @@ def calibration_motion(name: str = SINUSOID) -> CalibrationMotion:
 
     InputError if there is none of that name; the message names the nearest.
     """
-    if name not in _MOTIONS:
-        near = difflib.get_close_matches(name, _MOTIONS, n=1, cutoff=0.0)
-        raise InputError(
-            f'unknown calibration motion {name!r}, nearest is {near[0]!r} '
-            f'(known: {", ".join(_MOTIONS)})'
-        )
-    make, duration = _MOTIONS[name]
+    make, duration = named(name, _MOTIONS, 'calibration motion')
     return CalibrationMotion(name, make(), round(duration * CALIBRATION_RATE))

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from endoscope_core.errors import InputError
 from endoscope_core.signals.calibration_motion import (
     CALIBRATION_AMPLITUDE,
     calibration_sinusoid,
+    named,
 )
 from endoscope_core.signals.signal import FloatArray, Motion, Signal, hold, move, sequence, window
 
@@ -90,8 +89,7 @@ def triangle(amplitude: float, speed: float) -> Signal:
 def there_and_back(reach: float, speed: float) -> Signal:
     """A rise and a fall between -+`reach` (rad) by :func:`ramps`, which end where they began.
 
-    Both branches of a hysteresis show only in a stroke that is wider than the backlash, and what
-    depends on the bend only in what it is wider by: 40 deg more are enough.
+    40 deg beyond the backlash show both branches, and what depends on the bend.
     """
     return replace(ramps((0.0, reach, -reach, reach, 0.0), speed), name='there and back')
 
@@ -237,9 +235,4 @@ def motion_by_name(name: str) -> Motion:
 
     InputError if there is none of that name; the message names the nearest.
     """
-    if name not in MOTIONS:
-        near = difflib.get_close_matches(name, MOTIONS, n=1, cutoff=0.0)
-        raise InputError(
-            f'unknown motion {name!r}, nearest is {near[0]!r} (known: {", ".join(MOTIONS)})'
-        )
-    return MOTIONS[name]()
+    return named(name, MOTIONS, 'motion')()

@@ -13,7 +13,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from endoscope_devices.device import DeviceError, MotorReading
-from endoscope_devices.dynamixel.bring_up import bring_up, enable, is_emulated
+from endoscope_devices.dynamixel.bring_up import (
+    BusSettings,
+    ServoMount,
+    bring_up,
+    enable,
+    is_emulated,
+)
 from endoscope_devices.dynamixel.control_table import (
     ALERT,
     COUNT,
@@ -43,7 +49,6 @@ from endoscope_devices.dynamixel.servo_block import (
     ServoBlock,
     decode_block,
 )
-from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
 
 _RETRY_S = 0.5
 _HEALTH_PERIOD_S = 0.5

@@ -144,10 +144,7 @@ ALERT = 0x80
 
 
 def error_in_words(error: int) -> str:
-    """The error byte of a status packet in words (e-manual 'Protocol 2.0', 'Error').
-
-    Its highest bit alone means that Hardware Error Status(70) is not zero.
-    """
+    """Error byte of a status packet in words; its highest bit: see Hardware Error Status(70)."""
     number = error & ~ALERT
     words = [_ERROR_NUMBERS.get(number, f'error number {number}')] if number else []
     if error & ALERT:

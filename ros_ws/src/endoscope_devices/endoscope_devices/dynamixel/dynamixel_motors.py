@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from endoscope_core.rig import Kind
 from endoscope_devices.device import MotorReading
+from endoscope_devices.dynamixel.bring_up import BusSettings, ServoMount
 from endoscope_devices.dynamixel.bus_thread import BusThread, TimedReading
 from endoscope_devices.dynamixel.control_table import error_in_words
-from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
 
 
 class DynamixelMotors:

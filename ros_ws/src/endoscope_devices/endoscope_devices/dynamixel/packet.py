@@ -56,11 +56,7 @@ def crc16(data: bytes) -> int:
 
 
 def encode(device: int, instruction: int, parameters: bytes = b'') -> bytes:
-    """Make a packet, stuffed; ValueError where it is longer than a servo takes.
-
-    `device` is an id or ``BROADCAST_ID``, `instruction` an :class:`Instruction`, or ``STATUS`` with
-    the error byte first in the parameters.
-    """
+    """Make a packet, stuffed, an error byte first in `parameters`; ValueError if too long."""
     body = bytes((instruction,)) + parameters.replace(_BARE, _STUFFED)
     length = len(body) + CRC_SIZE
     if length > LARGEST_LENGTH:

@@ -129,10 +129,7 @@ class PacketHandler:
         )
 
     def drain(self, quiet: float) -> None:
-        """Discard bytes that still arrive, so that they answer no later request.
-
-        Ends once the line has been quiet for `quiet` s, or after ten times that.
-        """
+        """Discard what still arrives until the line is quiet for `quiet` s, or ten times that."""
         latest = time.monotonic() + 10.0 * quiet
         while self.port.receive(time.monotonic() + quiet) and time.monotonic() < latest:
             pass
@@ -198,10 +195,9 @@ class PacketHandler:
         size: int,
         margin: float = 0.0,
     ) -> dict[int, Reply]:
-        """Send one packet or more, and collect the answers of some servos to the last, by id.
+        """Send packets; answers to the last by id, of `size` bytes, as far as they came in time.
 
-        They answer in the order of `devices` with `size` data bytes each, and have `margin` s in
-        addition. Answers that did not come are missing. OSError when the adapter is gone.
+        Servos answer in the order of `devices`; `margin` is in s. OSError without an adapter.
         """
         port = self.port
         port.clearPort()
@@ -223,11 +219,7 @@ class PacketHandler:
         return collector.replies
 
     def broadcast_ping(self) -> dict[int, tuple[int, int]]:
-        """Model number and firmware version of every servo on the line, by id.
-
-        Servos answer one after the other by id; the time waited is the one that the SDK waits, 3 ms
-        for each id there can be.
-        """
+        """Model number and firmware version by id of every servo on the line, 3 ms an id."""
         self.port.clearPort()
         self.port.send(encode(BROADCAST_ID, Instruction.PING))
         deadline = time.monotonic() + self.margin + _PING_PAUSE_S * (LARGEST_ID + 1)

@@ -73,8 +73,8 @@ class BusPort(PortHandler):
     def receive(self, deadline: float) -> bytes:
         """Bytes that are there, waiting for the first up to `deadline`, s of ``time.monotonic``.
 
-        What came before it but could not be fetched in time, as when this process was held up, is
-        still given. Empty if nothing came; OSError when the adapter is gone.
+        What came before it and could not be fetched in time is still given. OSError without an
+        adapter.
         """
         wait = max(0.0, deadline - time.monotonic())
         ready, _, _ = select.select([self.ser.fileno()], [], [], wait)

@@ -63,11 +63,7 @@ class TickClock:
         self._seen_ns = 0
 
     def judge(self, tick: int, asked_ns: int, received_ns: int) -> Freshness:
-        """Judge the tick of a reading; only a new one moves the clock.
-
-        `asked_ns` and `received_ns` are our monotonic time in ns just before the request was sent
-        and just after the answer came.
-        """
+        """Judge the tick of a reading by steady ns of request and answer; a new one moves it."""
         if self._tick < 0 or received_ns - self._seen_ns > TICK_PERIOD * _MS // 4:
             self._set(tick, received_ns)
             self._low_ns = asked_ns - (tick + 1) * _MS
@@ -150,11 +146,7 @@ class BlockJudge:
     def judge(
         self, block: ServoBlock, watchdog: int, asked_ns: int, received_ns: int
     ) -> Freshness | Doubt:
-        """Judge one block.
-
-        `watchdog` is what Bus Watchdog(98) was set to; `asked_ns` and `received_ns` are our
-        monotonic time in ns before the request and after the answer.
-        """
+        """Judge one block by Bus Watchdog(98) as set and by steady ns of request and answer."""
         if block.watchdog not in (watchdog, -1):
             return Doubt(Failure.RESTARTED, 'has lost its settings: it has restarted')
         if self._last is not None:

@@ -41,10 +41,7 @@ _Gone = (serial.SerialException, OSError, termios.error)
 
 
 def crc16(data: bytes) -> int:
-    """CRC-16/ARC: x^16 + x^15 + x^2 + 1, reflected, starting from 0.
-
-    Aurora Application Program Interface Guide, appendix on calculating CRC; ``INIT:`` gives E3A5.
-    """
+    """CRC-16/ARC, reflected, from 0 (Aurora API Guide, appendix); ``INIT:`` gives E3A5."""
     crc = 0
     for byte in data:
         crc ^= byte

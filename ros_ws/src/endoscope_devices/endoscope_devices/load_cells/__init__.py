@@ -7,12 +7,7 @@ from endoscope_devices.load_cells.modbus_load_cells import (
     modbus_rtu,
     modbus_tcp,
 )
-from endoscope_devices.load_cells.tare import (
-    TareError,
-    apply_saved_tare,
-    save_tare,
-    tare_path,
-)
+from endoscope_devices.load_cells.tare import TareError, apply_saved_tare, save_tare, tare_path
 
 __all__ = [
     'CONNECTIONS',

@@ -1,14 +1,16 @@
-"""Byte streams to a transmitter: a serial port or a TCP connection, with a deadline on reading."""
+"""Byte streams to a transmitter, with a deadline on reading, and what its registers reply there."""
 
 import select
 import socket
 import time
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 
 import serial
 
 from endoscope_devices.device import DeviceError
 from endoscope_devices.load_cells.calibration_file import SerialSettings
+from endoscope_devices.load_cells.modbus_framing import Framing, ReplyError, ReplyTrouble
 
 # A Modbus frame has at most 260 bytes (Modbus Messaging on TCP/IP V1.0b, section 3.1.3).
 LONGEST = 260
@@ -16,6 +18,10 @@ MODBUS_TCP_PORT = 502
 _CONNECTS_S = 1.0
 # Start, eight of data, parity or a second stop bit, stop.
 _BITS = 11
+# After each fence that failed, the next waits for a longer silence: the fewer are under way at a
+# time, the later an answer may come and still be matched to its request.
+_LONGER = 8
+_LONGEST_SILENCE_NS = 1_000_000_000
 
 
 class LineLostError(DeviceError):
@@ -76,10 +82,7 @@ class Line[Opened: serial.Serial | socket.socket](ABC):
 
 
 class SerialLine(Line[serial.Serial]):
-    """A serial port, silent between frames as Modbus over Serial Line V1.02, 2.5.1.1 asks for.
-
-    That is 3.5 characters, or 1.75 ms above 19200 baud.
-    """
+    """A serial port, silent 3.5 characters between frames (Modbus over Serial Line, 2.5.1.1)."""
 
     def __init__(self, port: str, settings: SerialSettings) -> None:
         super().__init__(f'serial port {port}')
@@ -119,10 +122,7 @@ class SerialLine(Line[serial.Serial]):
 
 
 class TcpLine(Line[socket.socket]):
-    """A TCP connection to ``HOST`` or ``HOST:PORT``, by default port 502.
-
-    DeviceError where the address cannot be understood.
-    """
+    """A TCP connection to ``HOST`` or ``HOST:PORT`` (502); DeviceError for another address."""
 
     def __init__(self, address: str) -> None:
         host, _, port = address.partition(':')
@@ -151,4 +151,84 @@ class TcpLine(Line[socket.socket]):
         data = connection.recv(most)
         if not data:
             raise LineLostError(f'{self._name} closed the connection')
+        return data
+
+
+@dataclass(frozen=True)
+class RegisterReading:
+    """16-bit registers with the time at which they were asked for."""
+
+    asked_ns: int  # of ``time.monotonic_ns``
+    registers: tuple[int, ...]
+
+
+class RegisterReader:
+    """One request at a time on one line, which the caller has opened.
+
+    Modbus RTU replies do not identify their request: a late one looks like the reply to the next.
+    So after a time-out, and after unsolicited bytes, a fence is set: another number of registers is
+    requested, and until its reply has come, which a transmitter sends in order, all replies are
+    ignored. Consecutive fences request different numbers: a late reply to one of them must not open
+    the next.
+    """
+
+    def __init__(self, line: Line, framing: Framing, reply_timeout: float) -> None:
+        self._line = line
+        self._framing = framing
+        self._timeout_ns = round(reply_timeout * 1e9)
+        self._fenced = False
+        self._fences = 0  # put up so far
+        self._silence_ns = self._timeout_ns // 4  # which the next fence waits for
+        self.unexpected = 0  # bytes that came without a question
+
+    def read(self, address: int, count: int) -> RegisterReading:
+        """Read registers; ReplyError where no acceptable reply comes in time."""
+        waiting = len(self._line.read(LONGEST, 0))
+        self.unexpected += waiting
+        if waiting or self._fenced:
+            self._fence(address, count)
+        try:
+            return self._ask(address, count)
+        except ReplyError:
+            self._fenced = True
+            raise
+
+    def _fence(self, address: int, count: int) -> None:
+        self._fenced = True
+        # A line that is never silent is asked all the same, and answers with nothing acceptable.
+        latest = time.monotonic_ns() + _LONGEST_SILENCE_NS
+        while (now := time.monotonic_ns()) < latest:
+            if not self._line.read(LONGEST, now + self._silence_ns):
+                break
+        self._silence_ns = min(_LONGER * self._silence_ns, _LONGEST_SILENCE_NS)
+        others = range(1, count) if count > 1 else range(2, 5)
+        self._fences += 1
+        try:
+            self._ask(address, others[self._fences % len(others)])
+        except ReplyError as error:
+            # A refusal answers the fence's own question as well: two registers may not exist.
+            if error.trouble is not ReplyTrouble.REFUSED:
+                raise
+        self._fenced = False
+        self._silence_ns = self._timeout_ns // 4
+
+    def _ask(self, address: int, count: int) -> RegisterReading:
+        asked = time.monotonic_ns()
+        deadline = asked + self._timeout_ns
+        self._line.write(self._framing.request(address, count))
+        while True:
+            registers = self._framing.accept(self._reply(deadline))
+            if registers is not None:
+                return RegisterReading(asked, registers)
+
+    def _reply(self, deadline_ns: int) -> bytes:
+        data = b''
+        while len(data) < min(self._framing.length(data), LONGEST):
+            part = self._line.read(self._framing.length(data) - len(data), deadline_ns)
+            if not part:
+                raise ReplyError(
+                    ReplyTrouble.SILENCE,
+                    f'{len(data)} bytes within {self._timeout_ns * 1e-6:.0f} ms',
+                )
+            data += part
         return data

@@ -1,7 +1,9 @@
-"""Load cells behind a Modbus transmitter, read by a thread of their own."""
+"""Load cells behind a Modbus transmitter, read by a thread of their own, each reading judged."""
 
+import math
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -9,10 +11,11 @@ from typing import Protocol
 from endoscope_devices.device import ReadingThread
 from endoscope_devices.load_cells.calibration_file import (
     REGISTER_TYPES,
+    FaultLimits,
     LoadCellCalibration,
+    WireCell,
     decode_number,
 )
-from endoscope_devices.load_cells.channel_check import ChannelCheck
 from endoscope_devices.load_cells.modbus_framing import (
     Framing,
     ReplyError,
@@ -20,14 +23,106 @@ from endoscope_devices.load_cells.modbus_framing import (
     RtuFraming,
     TcpFraming,
 )
-from endoscope_devices.load_cells.modbus_line import Line, LineLostError, SerialLine, TcpLine
-from endoscope_devices.load_cells.register_reader import RegisterReader
+from endoscope_devices.load_cells.modbus_line import (
+    Line,
+    LineLostError,
+    RegisterReader,
+    SerialLine,
+    TcpLine,
+)
 from endoscope_devices.load_cells.tare import TareWindow, with_zero, zero_after_tare
 
+# So many good readings in a row end a fault, and so many consistent ones make a step a new level.
+CONFIRMATIONS = 3
+_SPIKES = 5
+_SPIKES_WITHIN_NS = 1_000_000_000
 _REOPEN_S = 0.2
 # So many readings in a row that cannot be believed are a fault; a single spike is not.
 _FAULTY_READINGS = 10
 _KEPT = 2000
+
+
+class ChannelCheck:
+    """Judges each reading of one cell.
+
+    Broken: only an open bridge drives the amplifier there. Frozen: the noise of a working cell
+    changes its last digit. Spiking: faster than ``spike_rate``, until three readings agree on a new
+    level. An old reply of Modbus RTU, which has no transaction number, is detected only here, where
+    the tension has changed by more than a wire can in one interval.
+    """
+
+    def __init__(self, wire: str, cell: WireCell, limits: FaultLimits) -> None:
+        self._wire = wire
+        self._limits = limits
+        self.cell = cell
+        self.fault = ''  # what is wrong, naming the wire; empty while readings are good
+        self.spikes = 0  # readings that changed too fast
+        self.new_levels = 0  # how often three of them were taken for a new level
+        self._good = 0
+        self._spiked_ns: deque[int] = deque(maxlen=_SPIKES)
+        self._count = math.nan
+        self._changed_ns = 0
+        self._level = math.nan
+        self._level_ns = 0
+        self._candidate = math.nan
+        self._candidate_ns = 0
+        self._agreeing = 0
+
+    def read(self, time_ns: int, count: float) -> float | None:
+        """Take a count at steady ns; the tension in N unless a fault is there or just over."""
+        trouble = self._trouble(time_ns, count)
+        if trouble:
+            self.fault = f'{self._wire}: {trouble}'
+            self._good = 0
+            return None
+        self._good += 1
+        if self.fault:
+            if self._good < CONFIRMATIONS:
+                return None
+            self.fault = ''
+        return self.cell.tension(count)
+
+    def _trouble(self, time_ns: int, count: float) -> str:
+        limits = self._limits
+        if not math.isfinite(count) or not limits.broken_below < count < limits.broken_above:
+            return f'broken wire of the cell ({count:.6g} counts)'
+        if not limits.saturated_below < count < limits.saturated_above:
+            return f'saturated ({count:.6g} counts)'
+        if count != self._count:
+            self._count = count
+            self._changed_ns = time_ns
+        still = (time_ns - self._changed_ns) * 1e-9
+        if 0.0 < limits.frozen_after <= still:
+            return f'frozen ({count:.6g} counts for {still:.1f} s)'
+        jump = self._jump(time_ns, self.cell.tension(count))
+        many = len(self._spiked_ns) == _SPIKES and (
+            time_ns - self._spiked_ns[0] < _SPIKES_WITHIN_NS
+        )
+        return f'spiking ({_SPIKES} times within a second)' if many else jump
+
+    def _jump(self, time_ns: int, tension: float) -> str:
+        if math.isnan(self._level) or self._near(self._level, self._level_ns, tension, time_ns):
+            self._take(time_ns, tension)
+            return ''
+        self.spikes += 1
+        self._spiked_ns.append(time_ns)
+        agrees = self._near(self._candidate, self._candidate_ns, tension, time_ns)
+        self._agreeing = self._agreeing + 1 if agrees else 1
+        self._candidate, self._candidate_ns = tension, time_ns
+        if self._agreeing >= CONFIRMATIONS:
+            self.new_levels += 1
+            self._take(time_ns, tension)
+            return ''
+        return f'spiking (from {self._level:.2f} N to {tension:.2f} N)'
+
+    def _near(self, before: float, before_ns: int, tension: float, time_ns: int) -> bool:
+        allowed = self._limits.spike_noise + self._limits.spike_rate * (time_ns - before_ns) * 1e-9
+        return abs(tension - before) <= allowed
+
+    def _take(self, time_ns: int, tension: float) -> None:
+        self._level, self._level_ns = tension, time_ns
+        self._agreeing = 0
+        self._candidate = math.nan
 
 
 @dataclass(frozen=True)
@@ -71,11 +166,7 @@ class LoadCellDevice(Protocol):
 
 
 class ModbusLoadCells(ReadingThread[WireReading]):
-    """Reads all wires at the calibration's rate and keeps the valid readings.
-
-    A reading with one invalid channel is dropped as a whole.  A lost line is reopened for as long
-    as the device is open.
-    """
+    """Reads all wires, whole readings or none; a lost line is reopened while it is open."""
 
     def __init__(self, calibration: LoadCellCalibration, line: Line, framing: Framing) -> None:
         super().__init__('load cells', _KEPT)

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from endoscope_bags.dataset_card import ChannelDelay
+from endoscope_bags.lerobot_dataset import ChannelDelay
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.effect import Effect
 from endoscope_core.physics.hooks import CELL_INPUT, LINKS, TRACKER, Hook

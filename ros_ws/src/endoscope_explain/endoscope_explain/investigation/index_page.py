@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from endoscope_core.names import JOINTS
-from endoscope_core.signals.command_file import read_command_file
+from endoscope_core.signals.sampled_motion import read_command_file
 from endoscope_explain.investigation.log import (
     CUT_SHORT,
     PLANT,

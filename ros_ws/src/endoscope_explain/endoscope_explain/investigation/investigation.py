@@ -13,7 +13,7 @@ from endoscope_core.names import JOINTS
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.plant_file import load_plant, save_plant
 from endoscope_core.rig import Rig
-from endoscope_core.signals.command_file import write_command_file
+from endoscope_core.signals.sampled_motion import write_command_file
 from endoscope_explain.case import ExplainedCase, Sources
 from endoscope_explain.design import is_wide, propose, what_is_asked
 from endoscope_explain.explanation import NamedEffect, Verdict

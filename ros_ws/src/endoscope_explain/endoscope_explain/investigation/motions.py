@@ -14,8 +14,12 @@ from endoscope_core.names import JOINTS
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.rig import Rig
 from endoscope_core.signals import Signal, hold, move, non_periodic_signal, sequence
-from endoscope_core.signals.command_file import CommandTable, read_command_file, write_command_file
 from endoscope_core.signals.motions import again_with_hold, chirp, steps_with_holds, there_and_back
+from endoscope_core.signals.sampled_motion import (
+    CommandTable,
+    read_command_file,
+    write_command_file,
+)
 from endoscope_explain.case import NextExperiment
 from endoscope_explain.experiment_motions import SAMPLE_S, answer_to, as_played, is_safe
 from endoscope_explain.investigation import log as logs

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from endoscope_bags import BagWriter, MessageStream, open_bag
-from endoscope_bags.cdr_encoding import encode_joint_states
+from endoscope_bags.cdr import encode_joint_states
 from endoscope_bags.errors import BagError
 from endoscope_bags.message_types import JOINT_STATE
 from endoscope_core.errors import EndoscopeError, InputError, nearest

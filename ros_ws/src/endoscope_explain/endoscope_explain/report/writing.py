@@ -11,7 +11,7 @@ from typing import Any
 
 from endoscope_core.names import JOINTS
 from endoscope_core.physics.plant_file import save_plant
-from endoscope_core.signals.command_file import write_command_file
+from endoscope_core.signals.sampled_motion import write_command_file
 from endoscope_explain.case import (
     EXPERIMENT_FILE,
     ExplainedCase,

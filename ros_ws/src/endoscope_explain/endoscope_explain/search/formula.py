@@ -8,9 +8,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from endoscope_core.physics.description import TermSpec
-from endoscope_core.physics.functions.expression import evaluate
 from endoscope_core.physics.functions.places import Shape
-from endoscope_core.physics.functions.term import tabulated
+from endoscope_core.physics.functions.term import evaluate, tabulated
 from endoscope_explain.fit.family import Family
 from endoscope_explain.fit.free_parameters import COORDINATE
 from endoscope_explain.fit.intervals import covariance

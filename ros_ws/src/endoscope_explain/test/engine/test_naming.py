@@ -3,7 +3,7 @@ import pytest
 from explained_corpus import CORPUS, LAW
 
 from endoscope_core.physics.description import EffectSpec
-from endoscope_core.physics.functions.expression import evaluate
+from endoscope_core.physics.functions.term import evaluate
 from endoscope_core.physics.simulator import simulate
 from endoscope_core.rig import shipped_rig
 from endoscope_explain.explain_recording import explain_recording

@@ -12,9 +12,8 @@ from endoscope_core.physics.effect import Effect, Parameter
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_core.physics.effects.laws import ONSETS
 from endoscope_core.physics.functions import FUNCTIONS, places
-from endoscope_core.physics.functions.expression import evaluate
 from endoscope_core.physics.functions.places import OTHER_ANGLE, Argument, Place, Shape
-from endoscope_core.physics.functions.term import tabulated
+from endoscope_core.physics.functions.term import evaluate, tabulated
 from endoscope_core.physics.kernel import run_joints
 from endoscope_core.physics.layout import (
     IN_COMMAND,

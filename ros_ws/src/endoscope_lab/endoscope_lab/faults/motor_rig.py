@@ -29,7 +29,7 @@ from endoscope_nodes.nodes.master import MasterNode
 from endoscope_nodes.nodes.motor_driver import MotorDriverNode
 from endoscope_nodes.nodes.recorder import RecorderNode
 from endoscope_nodes.nodes.supervisor import SupervisorNode
-from endoscope_nodes.runtime.eventless_node import EventlessNode
+from endoscope_nodes.runtime.environment import EventlessNode
 from endoscope_nodes.runtime.private_domain import process_domain
 from endoscope_nodes.runtime.qos import EVENT, RESULT, SENSOR_ASKED, SENSOR_OFFERED
 from endoscope_nodes.runtime.runtime import Runtime

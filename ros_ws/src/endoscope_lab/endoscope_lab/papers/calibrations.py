@@ -14,8 +14,13 @@ from endoscope_core.classifier.classification import (
     UnseenTensionError,
     nearest_class,
 )
-from endoscope_core.classifier.cnn_classifier import CnnClassifier, first, logarithm, stretched
-from endoscope_core.classifier.weights_file import load_classifier
+from endoscope_core.classifier.cnn_classifier import (
+    CnnClassifier,
+    first,
+    load_classifier,
+    logarithm,
+    stretched,
+)
 from endoscope_core.physics import SensorModel, simulate
 from endoscope_core.physics.description import SensorParameters
 from endoscope_core.signals import CALIBRATION_RATE, CalibrationMotion, calibration_motion

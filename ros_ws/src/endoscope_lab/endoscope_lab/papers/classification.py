@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from endoscope_core.classifier.classification import UnseenTensionError
-from endoscope_core.classifier.cnn_classifier import course
-from endoscope_core.classifier.weights_file import load_classifier
+from endoscope_core.classifier.cnn_classifier import course, load_classifier
 from endoscope_core.control import PhysicalParameters, bending_range
 from endoscope_core.identification import load_class_parameters
 from endoscope_core.identification.plant_fit import plants_of_calibration

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from endoscope_core.classifier.weights_file import load_classifier
+from endoscope_core.classifier.cnn_classifier import load_classifier
 from endoscope_core.control import FeedforwardLaw
 from endoscope_core.errors import EndoscopeError
-from endoscope_core.hysteresis.inverse import MODELS
+from endoscope_core.hysteresis import MODELS
 from endoscope_core.identification.law_choice import LawChoice
 from endoscope_core.physics import EffectSpec, PlantDescription
 from endoscope_core.signals import non_periodic_signal, periodic_signal

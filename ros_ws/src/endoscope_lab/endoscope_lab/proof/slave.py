@@ -9,8 +9,8 @@ import numpy as np
 from endoscope_bringup.demo.live_graph import LiveGraph
 from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.physics.plant_file import plant_as_text
-from endoscope_core.signals.command_file import write_command_file
 from endoscope_core.signals.motions import motion_by_name
+from endoscope_core.signals.sampled_motion import write_command_file
 from endoscope_explain.investigation.motions import Tracked
 from endoscope_explain.investigation.motions import tracked as tracked_of
 from endoscope_nodes.client.plant_adoption import AdoptedPlants

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from endoscope_bags import BagWriter, MessageStream
-from endoscope_bags.cdr_encoding import encode_joint_states
+from endoscope_bags.cdr import encode_joint_states
 from endoscope_bags.message_types import JOINT_STATE
 from endoscope_bags.recording import rig_record
 from endoscope_core.errors import EndoscopeError

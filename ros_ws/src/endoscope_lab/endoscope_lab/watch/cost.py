@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from endoscope_core.signals.command_file import write_command_file
+from endoscope_core.signals.sampled_motion import write_command_file
 from endoscope_lab.graph import Composition, Pace, least_cores
 from endoscope_nodes.graph import ALL_NODES
 

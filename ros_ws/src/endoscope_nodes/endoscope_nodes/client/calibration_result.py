@@ -44,10 +44,9 @@ def successful_result(
     limits: MotorLimits,
     zeros: 'NDArray[np.float64] | None' = None,
 ) -> DiagnosticArray:
-    """Say what was found; `backlash`, in rad, is None where the tracker could not measure it.
+    """Say what was found; `backlash` (rad) is None where the tracker could not measure it.
 
-    `duration`, of the whole calibration, is in s; how far the plants can be bent follows from the
-    rig's `limits`; `zeros` is what the zero of each load cell is off by, in N.
+    `duration` is in s, `zeros` what the zero of each load cell is off by in N.
     """
     verdict, lost = found.verdict, found.lost
     low, high = verdict.interval or (None, None)

@@ -13,7 +13,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from endoscope_core.calibration import CalibrationStep
-from endoscope_core.calibration.order_feedback import CALIBRATE, HOME, OrderFeedback, OrderState
+from endoscope_core.calibration.calibration_run import CALIBRATE, HOME, OrderFeedback, OrderState
 from endoscope_core.safety.operating_state import CAUSES_PRESENT
 from endoscope_nodes import names
 from endoscope_nodes.client.graph_listener import (

@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
@@ -12,12 +12,18 @@ from rclpy.serialization import deserialize_message
 from rclpy.time import Time
 from std_msgs.msg import Header, String
 
-from endoscope_core.calibration.order_feedback import OrderFeedback, OrderState
+from endoscope_core.calibration.calibration_run import OrderFeedback, OrderState
 from endoscope_core.errors import EndoscopeError
 from endoscope_core.exit_status import ClosedOnExit
 from endoscope_nodes import names
-from endoscope_nodes.client.order_feedback import feedback_of
-from endoscope_nodes.runtime.diagnostics import texts_of
+from endoscope_nodes.runtime.diagnostics import (
+    ERROR,
+    OK,
+    diagnostic_array,
+    from_status,
+    status,
+    texts_of,
+)
 from endoscope_nodes.runtime.qos import profile
 from endoscope_nodes.runtime.streams import RawSubscription
 from endoscope_nodes.topics import Qos
@@ -58,10 +64,7 @@ class Health:
 
 
 class GraphListener(ClosedOnExit):
-    """Listens to a graph; it hears only while it waits for something.
-
-    `serve` serves the node for so many seconds; what is waited for is looked at in between.
-    """
+    """Listens to a graph while it waits for something, in which `serve` serves the node."""
 
     def __init__(
         self,
@@ -189,11 +192,7 @@ class GraphListener(ClosedOnExit):
         return sorted({name for name, space in found if space == namespace and name != own})
 
     def wait_until(self, condition: Callable[[], bool], patience_s: float = PATIENCE_S) -> bool:
-        """Listen until something has come true, or for so long; whether it has.
-
-        So long is meant in the graph's time where that is slower than real time, however slow; a
-        graph whose time stands still is waited for as long.
-        """
+        """Listen until it is true, or for so long by the slower of two clocks; whether it is."""
         begun_s = moved_s = self._clock()
         self.hear()
         graph_ns, passed_ns = self.graph_ns, 0
@@ -237,3 +236,17 @@ def _healths(data: bytes, received_ns: int) -> dict[str, Health]:
         )
         for status in message.status
     }
+
+
+def feedback_message(feedback: OrderFeedback, stamp_ns: int) -> DiagnosticArray:
+    """Write it, at a time in ns."""
+    values = asdict(feedback)
+    words = values.pop('words')
+    level = ERROR if feedback.state in (OrderState.ABORTED, OrderState.REJECTED) else OK
+    return diagnostic_array(stamp_ns, status('calibration: order', level, words, values))
+
+
+def feedback_of(message: DiagnosticArray) -> OrderFeedback:
+    """Read it."""
+    [order] = message.status
+    return from_status(OrderFeedback, order, words=order.message)

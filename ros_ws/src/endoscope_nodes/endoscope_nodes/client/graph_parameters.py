@@ -67,12 +67,9 @@ def _one(kind: type, text: str) -> Any:
     try:
         value = yaml.safe_load(text)
         # YAML takes 1e-3 for a text.
-        return float(text) if kind is float and not isinstance(value, bool) else _whole(kind, value)
+        value = float(text) if kind is float and not isinstance(value, bool) else value
     except (ValueError, yaml.YAMLError):
         return None
-
-
-def _whole(kind: type, value: Any) -> Any:
     return value if type(value) is kind else None
 
 
@@ -146,17 +143,10 @@ def set_parameters(
 ) -> None:
     """Give a node new values of some parameters: all or, where it refuses one, none."""
     kind, service = SetParametersAtomically, f'{node}/set_parameters_atomically'
-    result = client.call(kind, service, _request(values), patience_s).result
+    parameters = [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
+    result = client.call(kind, service, kind.Request(parameters=parameters), patience_s).result
     if not result.successful:
         raise GraphError(result.reason or f'{node} refused it without a reason')
-
-
-def _request(values: Mapping[str, Any]) -> SetParametersAtomically.Request:
-    return SetParametersAtomically.Request(
-        parameters=[
-            Parameter(name, value=value).to_parameter_msg() for name, value in values.items()
-        ]
-    )
 
 
 def _plain(value: Any) -> Any:

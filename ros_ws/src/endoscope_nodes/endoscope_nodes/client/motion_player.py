@@ -16,11 +16,7 @@ from endoscope_nodes.client.graph_client import GraphClient
 from endoscope_nodes.client.graph_listener import MASTER, PATIENCE_S, RECORDER, GraphError
 from endoscope_nodes.client.graph_parameters import read_parameter, set_parameters
 from endoscope_nodes.client.handle_sender import clutch_message
-from endoscope_nodes.client.plant_adoption import (
-    AdoptedPlants,
-    RefusedAdoptionError,
-    plant_text,
-)
+from endoscope_nodes.client.plant_adoption import AdoptedPlants, RefusedAdoptionError, plant_text
 from endoscope_nodes.runtime.node_parameters import FOR_SESSION
 from endoscope_nodes.runtime.qos import EVENT
 
@@ -56,15 +52,12 @@ class MotionToPlay(Protocol):
 
 
 class MotionPlayer:
-    """Plays motions one at a time, each in a motion session of its own.
+    """Plays motions, each with consent in a motion session of its own, which ends with it.
 
-    A session is opened for a motion that somebody consents to, and ends with it. Whatever ends a
-    motion before its end pauses the graph. The motion goes on only while the clutch is held: by the
-    player, so that nothing moves on once its program is gone, or with `hold_to_play` by a person,
-    who enables the slave, too. What is `withdrawn` after consent, for a reason in words, is not
-    played. A recording that an investigation has left behind whose program is gone, or that nobody
-    asked for, makes room for its own; any other goes on. `plants` are those of whoever asks for
-    plants by this client already.
+    Whatever ends a motion before its end pauses the graph. The player holds the clutch, so that
+    nothing moves on once its program is gone, or with `hold_to_play` a person, who enables the
+    slave, too. What is `withdrawn` after consent, for a reason in words, is not played. A recording
+    that nobody asked for or needs any more makes room for its own; any other goes on.
     """
 
     def __init__(
@@ -84,12 +77,9 @@ class MotionPlayer:
         self.prepares = False  # once consented to, whether it may not be enabled yet
 
     def play(self, motion: MotionToPlay, file: Path, bag: Path, plant: Path | None = None) -> None:
-        """Play a motion, which a file holds, and record it to a bag that does not exist.
+        """Play a file's motion, by the inverse of a plant file if any, and record it to a new bag.
 
-        With a plant file the compensator inverts that plant meanwhile; what was in force before is
-        so again afterwards.
-
-        RigStoppedError if the rig stops on the way, NotPlayedError if nobody consents, a person
+        RigStoppedError if the rig stops on the way, NotPlayedError without consent, if a person
         ends it or the plant is refused, GraphError if the graph does not do what it is asked for.
         """
         client = self._client

@@ -9,7 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
 
-from endoscope_core.calibration.order_feedback import OrderState
+from endoscope_core.calibration.calibration_run import OrderState
 from endoscope_core.errors import FileError
 from endoscope_core.safety import AdoptionCode, BendingRange
 from endoscope_nodes import names
@@ -130,10 +130,7 @@ def plant_text(file: Path) -> str:
 
 
 class AdoptedPlants:
-    """Hears which adopted plant is in force in a graph, and asks for another.
-
-    Who has asked stays the one sender of requests until he leaves: a second one is refused.
-    """
+    """Hears which plant is in force, and asks for another as the one sender until he leaves."""
 
     def __init__(self, client: GraphClient) -> None:
         self._client = client
@@ -160,8 +157,7 @@ class AdoptedPlants:
     def adopt(self, plant: str, patience_s: float = PATIENCE_S) -> PlantInForce:
         """Have a plant file's text put into force; empty: the plant before.
 
-        RefusedAdoptionError, with why, if it is refused, or withdrawn because it took too long;
-        GraphError if nobody answers in time.
+        RefusedAdoptionError if it is refused or took too long; GraphError if nobody answers.
         """
         client = self._client
         if client.state == 'FAULT':

@@ -10,19 +10,15 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from threadpoolctl import threadpool_limits
 
-from endoscope_core.calibration.order_feedback import (
+from endoscope_core.calibration.calibration_run import (
     CALIBRATE,
     HOME,
     OrderCode,
     OrderFeedback,
     OrderState,
 )
-from endoscope_core.classifier.classification import (
-    Classifier,
-    ClassifierError,
-    UnseenTensionError,
-)
-from endoscope_core.classifier.weights_file import load_classifier
+from endoscope_core.classifier.classification import Classifier, ClassifierError, UnseenTensionError
+from endoscope_core.classifier.cnn_classifier import load_classifier
 from endoscope_core.control import MotorLimits
 from endoscope_core.judgement import Judgement, judged
 from endoscope_core.orders import Ending, Order, Orders, Pose
@@ -35,10 +31,9 @@ from endoscope_nodes.client.calibration_result import (
     refused_result,
     successful_result,
 )
-from endoscope_nodes.client.order_feedback import feedback_message
-from endoscope_nodes.runtime.beside import Beside
+from endoscope_nodes.client.graph_listener import feedback_message
 from endoscope_nodes.runtime.diagnostics import OK, Report
-from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.endoscope_node import Beside, EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
 from endoscope_nodes.runtime.node_parameters import CalibrationParameters
 from endoscope_nodes.runtime.parameters import ParameterError
@@ -51,11 +46,9 @@ from endoscope_nodes.safety.streams import StreamWatch
 class CalibrationNode(EndoscopeNode):
     """Serves ``calibration/run``, ``slave/home`` and ``home``; publishes ``calibration/result``.
 
-    A service answers at once, with the reason if it refuses. How far an order is follows on
-    ``calibration/feedback``, the result on its topic, and as numbers for programs that plot.
-    Where an order is aborted the commands stop, the slave holds or goes back to the master by a
-    ramp, and the result says why. Tensions unlike any known are refused: the result names no
-    class, and nothing is compensated.
+    A service answers at once; how an order fares is on ``calibration/feedback``. Where it is
+    aborted the slave holds or goes back to the master by a ramp, and the result says why. Tensions
+    unlike any known are refused: nothing is compensated.
     """
 
     def __init__(self, context: NodeContext) -> None:

@@ -24,10 +24,10 @@ from endoscope_devices.em_tracker import (
     save_registration,
 )
 from endoscope_nodes import names
-from endoscope_nodes.runtime.device_parameters import EmTrackerParameters
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, STALE, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
+from endoscope_nodes.runtime.node_parameters import EmTrackerParameters
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import LOCK_STEP, SENSOR_OFFERED
 from endoscope_nodes.runtime.streams import JointPublisher, JointSample, JointSubscription

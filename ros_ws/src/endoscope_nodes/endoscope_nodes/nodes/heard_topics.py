@@ -92,10 +92,7 @@ class HeardTopics:
         self._last_ns = stamp_ns
 
     def look_around(self) -> bool:
-        """Adapt one topic to its publishers; after the last one, see what else there is.
-
-        True in that case.
-        """
+        """Adapt one topic to its publishers; after the last see what else there is: True."""
         # One at a time, because the graph's answer for all of them would cost a tick.
         if self._to_look_at:
             self._adapt(self._to_look_at.pop())

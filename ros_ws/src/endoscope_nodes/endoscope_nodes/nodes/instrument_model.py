@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from std_msgs.msg import String
 
-from endoscope_bags.cdr_encoding import TransformEncoder
+from endoscope_bags.cdr import TransformEncoder
 from endoscope_bags.message_types import TF_MESSAGE
 from endoscope_core.kinematics import Vertebrae, robot_description
 from endoscope_core.rig import InstrumentFacts

@@ -13,10 +13,10 @@ from endoscope_devices.load_cells import (
     tare_path,
 )
 from endoscope_nodes import names
-from endoscope_nodes.runtime.device_parameters import LoadCellsParameters
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, STALE, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
+from endoscope_nodes.runtime.node_parameters import LoadCellsParameters
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import LOCK_STEP, SENSOR_ASKED, SENSOR_OFFERED
 from endoscope_nodes.runtime.streams import JointPublisher, JointSample, JointSubscription
@@ -24,11 +24,9 @@ from endoscope_nodes.runtime.ticker import SampleClock
 
 
 class LoadCellsNode(EndoscopeNode):
-    """Publishes ``wires/measured_js``: the tension of four wires in N.
+    """Publishes ``wires/measured_js``: the tension of four wires in N, none where one is faulty.
 
-    A reading in which a cell is broken, saturated, frozen or spiking is not published; the cell is
-    named in the diagnostics.  ``~/tare`` takes the tension of the last second for zero, and keeps
-    it beside the calibration file.
+    ``~/tare`` takes the tension of the last second for zero, and keeps it.
     """
 
     def __init__(self, context: NodeContext) -> None:

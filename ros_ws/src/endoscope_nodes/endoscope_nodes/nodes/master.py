@@ -35,11 +35,9 @@ WAITING = 'goes on while the clutch is held'
 class MasterNode(EndoscopeNode):
     """Publishes ``slave/servo_jp`` at 1 kHz, and ``master/clutch`` while it plays.
 
-    It moves the slave only in a motion session, and every time from the measured pose; see
-    :class:`MasterMotion`. While a calibration or a way home has the slave, the master rests. With
-    source ``none`` it leaves both topics to somebody else, or makes commands of the velocities that
-    another program sends. With ``hold_to_play`` it leaves him the clutch alone, and plays while
-    that is held. Velocities that fall silent while the clutch is held end the session.
+    It moves the slave only in a motion session, every time from the measured pose (see
+    :class:`MasterMotion`), and rests during a calibration. With source ``none`` it makes commands
+    of another program's velocities; with ``hold_to_play`` that has the clutch.
     """
 
     def __init__(self, context: NodeContext) -> None:

@@ -10,15 +10,15 @@ from endoscope_core.physics.plant_file import plant_as_text
 from endoscope_core.rig import Kind, RigKind, digest, rig_as_text
 from endoscope_core.safety import CommandLimits, MotionLimits, OperatingState, Refusal, ShaftMotion
 from endoscope_devices.device import DeviceError, MotorDevice
+from endoscope_devices.dynamixel.bring_up import BusSettings, ServoMount
 from endoscope_devices.dynamixel.control_table import BAUD_CODES
 from endoscope_devices.dynamixel.dynamixel_motors import DynamixelMotors
-from endoscope_devices.dynamixel.settings import BusSettings, ServoMount
 from endoscope_devices.simulated_slave import SimulatedSlave
 from endoscope_nodes import names
-from endoscope_nodes.runtime.device_parameters import DynamixelParameters, MotorDriverParameters
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.node_context import NodeContext
+from endoscope_nodes.runtime.node_parameters import DynamixelParameters, MotorDriverParameters
 from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import COMMAND, LOCK_STEP, RESULT, SENSOR_OFFERED
 from endoscope_nodes.runtime.streams import JointPublisher, JointSample, JointSubscription
@@ -32,13 +32,10 @@ _REPEATED_NS = 50_000_000
 class MotorDriverNode(EndoscopeNode):
     """Obeys ``motor/servo_jp`` as far as it is safe, and publishes what the shafts do.
 
-    A command is obeyed while it belongs to the motion session that the node takes part in, has one
-    sender and passes the gate; what it asks for goes through the motion shaper.  Every tick the
-    shaped goal goes to the device and its reading is published, and the goal where it changes.
-    Without fresh commands, and outside of a session, the shafts go to the position measured at that
-    moment and hold it; only ``DISABLED`` lets them go.  The simulated slave also publishes the
-    noise-free tensions and angles that the simulated load cells and tracker read.  On ``rig/kind``
-    it says whether what it drives is simulated, emulated or real.
+    A command of the open motion session, from one sender, passes gate and motion shaper; every tick
+    the goal goes to the device and its reading is published. Without fresh commands the shafts go
+    to the position measured at that moment and hold it; only ``DISABLED`` lets them go. The
+    simulated slave also publishes what the simulated load cells and tracker read.
     """
 
     def __init__(self, context: NodeContext) -> None:

@@ -6,15 +6,14 @@ from concurrent.futures import Future
 
 from diagnostic_msgs.msg import DiagnosticArray
 
-from endoscope_core.calibration.order_feedback import OrderState
+from endoscope_core.calibration.calibration_run import OrderState
 from endoscope_core.choices import BY_ADOPTED, PHYSICAL
 from endoscope_core.compensation.law_in_force import LawInForce, Selection
 from endoscope_core.control import AdoptedPlant, AdoptionError, adopted_plant
 from endoscope_core.safety import AdoptionCode
 from endoscope_nodes import names
 from endoscope_nodes.client.plant_adoption import AdoptionRequest, PlantInForce, Reach
-from endoscope_nodes.runtime.beside import Beside
-from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
+from endoscope_nodes.runtime.endoscope_node import Beside, EndoscopeNode
 from endoscope_nodes.runtime.node_parameters import FOR_SESSION
 from endoscope_nodes.runtime.qos import EVENT, RESULT
 from endoscope_nodes.safety.sessions import SessionWatch
@@ -25,10 +24,8 @@ _LOOK_S = 0.05
 class PlantAdoption:
     """Answers ``compensator/adopt``, and says on ``compensator/plant`` what is in force.
 
-    A request is obeyed in the motion session that it names, from one sender, and only at rest: when
-    it comes, and once the plant has been tried, which takes a moment. `check_rest` raises an
-    AdoptionError where the slave does not rest, or is bent further than a plant allows; `select`
-    changes what selects the feed-forward.
+    A request is obeyed in its motion session, from one sender, and at rest when it comes and once
+    the plant has been tried: `check_rest` raises an AdoptionError. `select` changes the selection.
     """
 
     def __init__(

@@ -37,14 +37,10 @@ _WATCHED_S = 60.0
 class RecorderNode(EndoscopeNode):
     """Records from ``recorder/start`` to ``recorder/stop`` or the end; a named bag from the start.
 
-    In real time a message is recorded with the middleware's stamps of receipt and publication. In
-    simulated time both are the tick of ``/clock`` in which it came, so that the same simulation
-    gives the same bag. Losses, found as gaps in the publishers' numbers, and a full disk are
-    reported in the diagnostics, in the bag, and by exit code 1.
-
-    What came in the last seconds is kept in memory whether or not it is recorded. When the slave
-    goes to ``FAULT``, or ``recorder/mark`` says something, it and what follows becomes a bag of its
-    own. Every bag begins with what was in force: latched topics and the motion session.
+    In simulated time both stamps of a message are the tick in which it came, so that the same
+    simulation gives the same bag. Losses and a full disk are reported in the diagnostics, in the
+    bag, and by exit code 1. The last seconds are kept in memory for the bag of a ``FAULT`` or of a
+    ``recorder/mark``. Every bag begins with what was in force.
     """
 
     def __init__(self, context: NodeContext) -> None:

@@ -8,7 +8,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from endoscope_bags import RawMessage, Recording, Topic, open_bag
-from endoscope_bags.cdr_encoding import encode_clock
+from endoscope_bags.cdr import encode_clock
 from endoscope_bags.errors import BagError
 from endoscope_nodes.names import CLOCK, DIAGNOSTICS, MOTOR_COMMAND, MOTOR_MEASURED
 from endoscope_nodes.runtime.diagnostics import OK, Report
@@ -40,7 +40,10 @@ class ReplayNode(EndoscopeNode):
             raise ParameterError("replay: parameter 'use_sim_time' is true; it makes /clock itself")
         self._parameters_ = p
         self._process = context
-        recording = self._open(p.bag)
+        try:
+            recording = open_bag(p.bag)
+        except BagError as error:
+            raise ParameterError(f"replay: parameter 'bag': {error}") from error
         self._outputs = {topic.name: self._publisher(topic) for topic in self._chosen(recording)}
         self._messages: Iterator[RawMessage] = recording.messages(list(self._outputs))
         self._next = next(self._messages, None)
@@ -62,12 +65,6 @@ class ReplayNode(EndoscopeNode):
     def announcement(self) -> str:
         """Name the bag."""
         return f'{self._parameters_.bag}, {self._parameters_.speed:g} times its pace'
-
-    def _open(self, bag: str) -> Recording:
-        try:
-            return open_bag(bag)
-        except BagError as error:
-            raise ParameterError(f"replay: parameter 'bag': {error}") from error
 
     def _chosen(self, recording: Recording) -> list[Topic]:
         wanted = [topic for topic in self._parameters_.topics if topic]

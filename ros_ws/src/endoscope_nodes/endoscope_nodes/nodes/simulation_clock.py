@@ -11,7 +11,7 @@ from rclpy.task import Future
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import JointState
 
-from endoscope_bags.cdr_encoding import encode_clock
+from endoscope_bags.cdr import encode_clock
 from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.names import CLOCK_NODE, FACTOR, SLAVE_MEASURED
 from endoscope_nodes.runtime.diagnostics import OK, Report
@@ -33,14 +33,12 @@ class BarrierTimeout(EndoscopeError, TimeoutError):
 
 
 class SimulationClockNode(EndoscopeNode):
-    """Publishes ``/clock`` in lock-step with the graph.
+    """Publishes ``/clock`` in lock-step with the graph, at most at a pace of ``speed``.
 
     The next tick comes once every topic of ``wait_for``, and every other stream of another process
-    that answered the tick before, has published a message with this tick's stamp, and the nodes of
-    this process have dealt with all that they sent each other.  In one process this makes the
-    content of every message a function of parameters and seeds alone, however busy the machine is.
-
-    With a ``speed`` time goes on at that pace where the machine can, and slower where it cannot.
+    that answered the tick before, has this tick's stamp, and the nodes of this process have dealt
+    with all that they sent each other: in one process every message then is a function of
+    parameters and seeds alone.
     """
 
     def __init__(self, context: NodeContext) -> None:

@@ -32,11 +32,9 @@ _VITAL = ('motor_driver: device', 'load_cells: cells')
 class SupervisorNode(EndoscopeNode):
     """Publishes ``slave/operating_state`` and ``slave/motion_session``, obeys state commands.
 
-    ``slave/stop`` is ``pause`` as a service, which is done with where nothing can move.
-
     An ``enable`` opens a motion session, whose name it repeats at 20 Hz; a fault, ``disable`` and
-    ``pause`` end it.  Faults are a wire over its ceiling, silent motors or load cells, an error of
-    a vital device, a node that has left the session, and a second sender on a topic that has one.
+    ``pause`` end it. Faults are a wire over its ceiling, silent motors or load cells, an error of a
+    vital device, a node that has left the session, and a second sender on a topic that has one.
     """
 
     def __init__(self, context: NodeContext) -> None:

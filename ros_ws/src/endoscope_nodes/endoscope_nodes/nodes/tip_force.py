@@ -1,7 +1,8 @@
 """Publishes the force across the tip that wires, motors and tracker show by the plant in force."""
 
 import math
-from concurrent.futures import Future
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
@@ -9,19 +10,16 @@ from geometry_msgs.msg import WrenchStamped
 from rclpy.time import Time
 from threadpoolctl import threadpool_limits
 
-from endoscope_core.calibration.order_feedback import OrderState
+from endoscope_core.calibration.calibration_run import OrderState
 from endoscope_core.errors import FileError
 from endoscope_core.kinematics import Vertebrae
 from endoscope_core.physics import PlantDescription
 from endoscope_core.tip_force import State, TipForce, TipForceEstimator
 from endoscope_core.tip_force.free_motion import BLOCK_S
 from endoscope_nodes import names
-from endoscope_nodes.client.order_feedback import feedback_of
-from endoscope_nodes.client.plant_adoption import PlantInForce
-from endoscope_nodes.runtime.beside import Beside
+from endoscope_nodes.client.graph_listener import feedback_of
+from endoscope_nodes.nodes.rig_follower import STREAMS, RigFollower
 from endoscope_nodes.runtime.diagnostics import OK, WARN, Report
-from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
-from endoscope_nodes.runtime.joint_readings import JointReadings, RigReadings
 from endoscope_nodes.runtime.node_context import NodeContext, adopted_plant
 from endoscope_nodes.runtime.node_parameters import TipForceParameters
 from endoscope_nodes.runtime.qos import RESULT, SENSOR_OFFERED
@@ -31,7 +29,7 @@ _SECOND = 1_000_000_000
 _CALIBRATE = 'calibrate'
 
 
-class TipForceNode(EndoscopeNode):
+class TipForceNode(RigFollower[list[TipForce]]):
     """Works out what the tip touches, 40 times a second, in a thread of its own.
 
     The plant is the one in force: the adopted one, or else the one described. Nothing touches the
@@ -42,66 +40,39 @@ class TipForceNode(EndoscopeNode):
         super().__init__('tip_force', context)
         self._active = self.parameters(TipForceParameters).active
         self.diagnostics.add('force', self._report)
-        self._readings = RigReadings()
         if not self._active:
             return
         instrument = self.rig.instrument
         self._frame = Vertebrae(instrument.section_length, instrument.base_frame).tip_frame
         self._plant = context.plant
-        self._adopted = PlantInForce()
-        self._free = self._wanted = False
+        self._free = False
         self._last: TipForce | None = None
         self._published = 0
         # Of small matrices: threads for each would stand in the way of the other nodes.
         threadpool_limits(1, 'blas')
         self.estimator = _compiled(self._plant, instrument.section_length)
-        self._readings.streams = {
-            'motor': JointReadings.of(
-                self, names.MOTOR_MEASURED, names.MOTORS, lambda s: [s.require('position')]
-            ),
-            'wires': JointReadings.of(
-                self, names.WIRES_MEASURED, names.WIRES, lambda s: [s.require('effort')]
-            ),
-            'tracker': JointReadings.of(
-                self, names.SLAVE_MEASURED, names.JOINTS, lambda s: [s.require('position')]
-            ),
-        }
         self._forces = self.create_publisher(WrenchStamped, names.TIP_FORCE, SENSOR_OFFERED)
         self._bounds = JointPublisher(
             self, names.TIP_FORCE_BOUNDS, names.BOUNDS, ('effort',), SENSOR_OFFERED
         )
-        self.create_subscription(DiagnosticArray, names.COMPENSATOR_PLANT, self._on_plant, RESULT)
         self.create_subscription(
             DiagnosticArray, names.CALIBRATION_FEEDBACK, self._on_feedback, RESULT
         )
-        self._beside = Beside(self.ticker)
-        self._working: Future[list[TipForce]] | None = None
-        self.ticker.every(BLOCK_S, self._look)
-
-    def extra_readers(self) -> list[tuple[str, int]]:
-        """Topics that are read past the executor, and how many publishers each has found."""
-        return self._readings.heard()
-
-    def _on_plant(self, message: DiagnosticArray) -> None:
-        reported = PlantInForce.of_message(message)
-        if reported is not None and reported.hash != self._adopted.hash:
-            self._adopted, self._wanted = reported, True
+        self._follow(STREAMS, BLOCK_S)
 
     def _on_feedback(self, message: DiagnosticArray) -> None:
         order = feedback_of(message)
         self._free = order.order == _CALIBRATE and order.state == OrderState.EXECUTING
 
-    def _look(self) -> None:
-        """Publish what was worked out, and have what came since then worked out."""
-        if self._working is not None:
-            if not self._working.done():
-                return
-            for force in self._working.result():
-                self._publish(force)
+    def _take(self, found: list[TipForce]) -> None:
+        for force in found:
+            self._publish(force)
+
+    def _next(self) -> Callable[[], list[TipForce]]:
         if self._wanted:
             self._wanted = False
             self._begin()
-        self._working = self._beside.submit(self._work, self._free)
+        return partial(self._work, self._free)
 
     def _begin(self) -> None:
         """Start anew with the plant in force."""
@@ -111,19 +82,19 @@ class TipForceNode(EndoscopeNode):
             self.get_logger().error(f'continues with the plant before: {error}')
             return
         self.estimator = TipForceEstimator(plant, self.rig.instrument.section_length)
-        self._readings.forget()
+        self._forget()
         self._last = None
 
     def _work(self, free: bool) -> list[TipForce]:
         self.estimator.free = free
-        newest = self._readings.pass_on(self.estimator)
+        newest = self._pass_on(self.estimator)
         return self.estimator.update(max(newest.values())) if newest else []
 
     def _publish(self, force: TipForce) -> None:
         changed = self._last is None or self._last.seen != force.seen
         self._last = force
         message = WrenchStamped()
-        stamp_ns = self._readings.origin_ns + round(force.time * _SECOND)
+        stamp_ns = self._origin_ns + round(force.time * _SECOND)
         message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
         message.header.frame_id = self._frame
         message.wrench.force.x, message.wrench.force.y = force.force.tolist()
@@ -158,12 +129,6 @@ class TipForceNode(EndoscopeNode):
             bounds = f'{force.at_least:.2g} to {force.at_most:.2g} N'
             return WARN, f'the tip touches something: {force.size:.2g} N ({bounds})', values
         return OK, f'nothing touches the tip with {force.visible:.2g} N or more', values
-
-    def close(self) -> None:
-        """Let the thread end, and leave the topics."""
-        if self._active:
-            self._beside.close()
-        self._readings.close()
 
 
 def _compiled(plant: PlantDescription, section_length: float) -> TipForceEstimator:

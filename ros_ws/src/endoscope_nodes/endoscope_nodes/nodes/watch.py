@@ -1,11 +1,9 @@
 """Watches whether the rig that moves still matches its plant, and reports it."""
 
-from concurrent.futures import Future
+from collections.abc import Callable
 from datetime import UTC, datetime
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
-from numpy.typing import NDArray
 from std_msgs.msg import String
 from threadpoolctl import threadpool_limits
 
@@ -15,14 +13,11 @@ from endoscope_core.monitoring.rig_watch import BLOCK_S, LEARNT, WINDOWS
 from endoscope_core.monitoring.thresholds import FALSE_ALARMS_PER_HOUR
 from endoscope_core.physics import PlantDescription
 from endoscope_nodes import names
-from endoscope_nodes.client.plant_adoption import PlantInForce
-from endoscope_nodes.runtime.beside import Beside
+from endoscope_nodes.nodes.rig_follower import STREAMS, RigFollower
 from endoscope_nodes.runtime.diagnostics import OK, STALE, WARN, Report
-from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
-from endoscope_nodes.runtime.joint_readings import JointReadings, RigReadings
 from endoscope_nodes.runtime.node_context import NodeContext, adopted_plant, load_slave
 from endoscope_nodes.runtime.node_parameters import WatchParameters
-from endoscope_nodes.runtime.qos import EVENT, RESULT
+from endoscope_nodes.runtime.qos import EVENT
 
 _SECOND = 1_000_000_000
 _NAMED_S = 10.0
@@ -30,15 +25,17 @@ _NAMED_S = 10.0
 _SILENT_S = 1.0
 # What is judged is learnt only once it is older than any change that is looked for.
 _LEARNING_S = BLOCK_S * float(LEARNT + WINDOWS[-1])
-_Array = NDArray[np.float64]
+_STREAMS = {
+    'setpoint': (names.MOTOR_SETPOINT, names.MOTORS, ['position']),
+    **STREAMS,
+    'motor': (names.MOTOR_MEASURED, names.MOTORS, ['position', 'effort']),
+}
 
 
-class WatchNode(EndoscopeNode):
+class WatchNode(RigFollower[None]):
     """Tells on ``/diagnostics`` that the rig is no longer the one described: where, since when.
 
-    The rig is compared with the plant in force: the adopted one, or else the one described. What
-    is heard is judged four times a second in a thread of its own; the executor is not concerned. An
-    alarm stays until ``watch/restart`` or until another plant is in force, and has the recorder
+    An alarm stays until ``watch/restart`` or until another plant is in force, and has the recorder
     keep the last seconds.
     """
 
@@ -46,7 +43,6 @@ class WatchNode(EndoscopeNode):
         super().__init__('watch', context)
         p = self.parameters(WatchParameters)
         self._active = p.active
-        self._readings = RigReadings()
         self.diagnostics.add('rig', self._report)
         self.serve(names.WATCH_RESTART, self._restart)
         if not p.active:
@@ -54,7 +50,6 @@ class WatchNode(EndoscopeNode):
         own = load_slave("watch: parameter 'plant'", p.plant) if p.plant else None
         self._described = own or context.plant
         self._source = self._described_by = p.plant or context.plant_name
-        self._adopted = PlantInForce()
         self._wanted = True
         self._newest_s = 0.0
         self._heard_ns = self.ticker.monotonic_ns()
@@ -64,42 +59,13 @@ class WatchNode(EndoscopeNode):
         threadpool_limits(1, 'blas')
         # Compiled here rather than beside the ticks.
         self.rig_watch = _compiled(self._described)
-        self._readings.streams = {
-            'setpoint': JointReadings.of(
-                self, names.MOTOR_SETPOINT, names.MOTORS, lambda s: [s.require('position')]
-            ),
-            'motor': JointReadings.of(
-                self,
-                names.MOTOR_MEASURED,
-                names.MOTORS,
-                lambda s: [s.require('position'), _or_nan(s.effort, s.require('position'))],
-            ),
-            'wires': JointReadings.of(
-                self, names.WIRES_MEASURED, names.WIRES, lambda s: [s.require('effort')]
-            ),
-            'tracker': JointReadings.of(
-                self, names.SLAVE_MEASURED, names.JOINTS, lambda s: [s.require('position')]
-            ),
-        }
         self._marks = self.create_publisher(String, names.RECORDER_MARK, EVENT)
-        self.create_subscription(DiagnosticArray, names.COMPENSATOR_PLANT, self._on_plant, RESULT)
-        self._beside = Beside(self.ticker)
-        self._judging: Future[None] | None = None
-        self.ticker.every(BLOCK_S, self._look)
-
-    def extra_readers(self) -> list[tuple[str, int]]:
-        """Topics that are read past the executor, and how many publishers each has found."""
-        return self._readings.heard()
+        self._follow(_STREAMS, BLOCK_S)
 
     @property
     def announcement(self) -> str:
         """Say that it watches."""
         return f'watching for a rig other than {self._source}' if self._active else ''
-
-    def _on_plant(self, message: DiagnosticArray) -> None:
-        reported = PlantInForce.of_message(message)
-        if reported is not None and reported.hash != self._adopted.hash:
-            self._adopted, self._wanted = reported, True
 
     def _restart(self) -> tuple[bool, str]:
         if not self._active:
@@ -107,18 +73,12 @@ class WatchNode(EndoscopeNode):
         self._wanted = True
         return True, 'learns anew'
 
-    def _look(self) -> None:
-        """Take what was judged, and have what came since then judged."""
-        if self._judging is not None:
-            if not self._judging.done():
-                return
-            self._judging.result()
-        self._tell()
-        work = self._begin if self._wanted else self._judge
-        if self._wanted:
-            self._wanted = False
-            self._alarms, self._kept = {}, set()
-        self._judging = self._beside.submit(work)
+    def _next(self) -> Callable[[], None]:
+        if not self._wanted:
+            return self._judge
+        self._wanted = False
+        self._alarms, self._kept = {}, set()
+        return self._begin
 
     def _begin(self) -> None:
         """Learn anew, with the plant in force."""
@@ -130,17 +90,17 @@ class WatchNode(EndoscopeNode):
         else:
             if adopted is not None:
                 plant, self._source = adopted, f'adopted plant {self._adopted.hash}'
-        self._readings.forget()
+        self._forget()
         self.rig_watch = RigWatch(plant)
 
     def _judge(self) -> None:
-        newest = self._readings.pass_on(self.rig_watch)
+        newest = self._pass_on(self.rig_watch)
         if 'motor' in newest:
             self._heard_ns = self.ticker.monotonic_ns()
             self._newest_s = newest['motor']
             self.rig_watch.update(self._newest_s)
 
-    def _tell(self) -> None:
+    def _take(self, _: None) -> None:
         """Say what is new, and have the recorder keep what led to it."""
         news = False
         for alarm in self.rig_watch.alarms:
@@ -159,9 +119,7 @@ class WatchNode(EndoscopeNode):
         return f'{alarm}, since {self._utc(alarm.since)}, margin {alarm.margin:.1f}'
 
     def _utc(self, seconds: float) -> str:
-        return (
-            f'{datetime.fromtimestamp(seconds + self._readings.origin_ns * 1e-9, UTC):%H:%M:%S} UTC'
-        )
+        return f'{datetime.fromtimestamp(seconds + self._origin_ns * 1e-9, UTC):%H:%M:%S} UTC'
 
     def _report(self) -> Report:
         if not self._active:
@@ -176,7 +134,7 @@ class WatchNode(EndoscopeNode):
         }
         for joint in watch.joints:
             values[f'{joint.name} learnt [s]'] = BLOCK_S * min(joint.test.learnt, LEARNT)
-        for name, stream in self._readings.streams.items():
+        for name, stream in self._streams.items():
             values[f'{name} unreadable'] = stream.unreadable
         for alarm in self._alarms.values():
             values |= {
@@ -195,16 +153,6 @@ class WatchNode(EndoscopeNode):
             words = f'{names.LEARNING}, {moved:.0f} of {_LEARNING_S:.0f} s: every joint has to move'
             return OK, words, values
         return OK, f'the rig is as described by {self._source}', values
-
-    def close(self) -> None:
-        """Let the thread end, and leave the topics."""
-        if self._active:
-            self._beside.close()
-        self._readings.close()
-
-
-def _or_nan(values: _Array | None, like: _Array) -> _Array:
-    return np.full_like(like, np.nan) if values is None else values
 
 
 def _compiled(plant: PlantDescription) -> RigWatch:

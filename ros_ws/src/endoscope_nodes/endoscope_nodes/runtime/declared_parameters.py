@@ -154,10 +154,7 @@ def check_sections(args: Sequence[str], namespace: str) -> list[str]:
 
 
 def given_to_nodes(args: Sequence[str]) -> dict[str, dict[str, object]]:
-    """Values of `-p NODE:NAME:=VALUE` by node, in whatever namespace that is.
-
-    rcl would give them to a node without a namespace alone, and knows no rule for any other.
-    """
+    """Values of `-p NODE:NAME:=VALUE` by node; rcl knows them without a namespace alone."""
     found: dict[str, dict[str, object]] = {}
     for rule in _values_of(args, ('-p', '--param')):
         name, _, value = rule.partition(':=')

@@ -101,10 +101,7 @@ def diagnostic_array(
 
 
 class Diagnostics:
-    """Collects the reports of a node's parts and publishes them at the pace of its ticker: 1 Hz.
-
-    The node's name, with namespace, is the first half of every status name.
-    """
+    """Collects the reports of a node's parts and publishes them at 1 Hz by its ticker."""
 
     def __init__(self, node: Node, ticker: Ticker) -> None:
         self._node = node

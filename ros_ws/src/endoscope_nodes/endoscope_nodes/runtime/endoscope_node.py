@@ -1,6 +1,7 @@
 """What every node of the endoscope has: the shared ticker and rig, parameters, diagnostics."""
 
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 from rclpy.clock import Clock, ClockType, ROSClock
@@ -12,13 +13,38 @@ from rclpy.subscription import Subscription
 from rclpy.time import Time
 from std_srvs.srv import Trigger
 
+from endoscope_core.errors import EndoscopeError
 from endoscope_nodes.names import CLOCK_NODE
 from endoscope_nodes.runtime.declared_parameters import declare_parameters
 from endoscope_nodes.runtime.diagnostics import Diagnostics
-from endoscope_nodes.runtime.eventless_node import EventlessNode
+from endoscope_nodes.runtime.environment import EventlessNode
 from endoscope_nodes.runtime.node_context import NAMESPACE, NodeContext
 from endoscope_nodes.runtime.node_parameters import FOR_SESSION
 from endoscope_nodes.runtime.parameters import ParameterError, changed
+from endoscope_nodes.runtime.ticker import Ticker
+
+
+class Beside:
+    """Computes in a thread; in simulated time that nobody paces at once, so that it is the same."""
+
+    def __init__(self, ticker: Ticker) -> None:
+        self._ticker = ticker
+        self._thread = ThreadPoolExecutor(1)
+
+    def submit[**P, T](
+        self, compute: Callable[P, T], *args: P.args, **kwargs: P.kwargs
+    ) -> Future[T]:
+        if self._ticker.paced or not self._ticker.simulated:
+            return self._thread.submit(compute, *args, **kwargs)
+        done: Future[T] = Future()
+        try:
+            done.set_result(compute(*args, **kwargs))
+        except EndoscopeError as error:
+            done.set_exception(error)
+        return done
+
+    def close(self) -> None:
+        self._thread.shutdown()
 
 
 class EndoscopeNode(EventlessNode):

@@ -1,22 +1,27 @@
-"""What a process takes from its environment before ROS starts: domain, range, log level."""
+"""What a process takes from its environment before ROS starts, and the nodes it then makes."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 import rclpy
 from rclpy.context import Context
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidNamespaceException
 from rclpy.logging import LoggingSeverity, set_logger_level
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
+from rclpy.subscription import Subscription
 
 from endoscope_core.choices import LOG_LEVEL_VARIABLE, LOG_LEVELS
-from endoscope_nodes.runtime.eventless_node import EventlessNode
 from endoscope_nodes.runtime.parameters import ParameterError
 
+_NOT_SENT = PublisherEventCallbacks(use_default_callbacks=False)
+_NOT_TAKEN = SubscriptionEventCallbacks(use_default_callbacks=False)
 RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 PEERS = 'ROS_STATIC_PEERS'
 PROFILES = 'FASTRTPS_DEFAULT_PROFILES_FILE'
@@ -30,6 +35,31 @@ LOOPBACK = Path(__file__).with_name('this_machine.xml')
 # OFF is nobody but this process, for which Fast DDS listens at every address all the same.
 _ON_THIS_MACHINE = ('LOCALHOST', 'OFF')
 _WIDER = ('SUBNET', 'SYSTEM_DEFAULT')
+
+
+class EventlessNode(Node):
+    """A node whose publishers and subscriptions wake an executor for messages alone.
+
+    By default rclpy attaches an event to each, to log a QoS that does not match. Served by an
+    EventsExecutor such events can dead-lock with Fast DDS (rmw_fastrtps #890), and a publisher that
+    is destroyed while an executor waits for its events can crash it (rclpy #1644).
+    """
+
+    def create_publisher(
+        self, msg_type: type, topic: str, qos_profile: Any, **how: Any
+    ) -> Publisher:
+        """Offer a topic."""
+        return super().create_publisher(
+            msg_type, topic, qos_profile, event_callbacks=_NOT_SENT, **how
+        )
+
+    def create_subscription(
+        self, msg_type: type, topic: str, callback: Callable[..., Any], qos_profile: Any, **how: Any
+    ) -> Subscription:
+        """Subscribe."""
+        return super().create_subscription(
+            msg_type, topic, callback, qos_profile, event_callbacks=_NOT_TAKEN, **how
+        )
 
 
 def stay_on_this_machine() -> None:
@@ -96,26 +126,26 @@ def joined_node(name: str, namespace: str, domain: int | None = None) -> Iterato
         args=[], context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO
     )
     try:
-        with _node(name, namespace, context) as node:
+        with bare_node(name, f'/{namespace.strip("/")}', context) as node:
             yield node
+    except InvalidNamespaceException as error:
+        raise ParameterError(
+            f'--namespace {namespace!r} cannot be one: letters, digits, _ and /'
+        ) from error
     finally:
         context.try_shutdown()
 
 
 @contextmanager
-def _node(name: str, namespace: str, context: Context) -> Iterator[Node]:
-    try:
-        node = EventlessNode(
-            name,
-            context=context,
-            namespace=f'/{namespace.strip("/")}',
-            enable_rosout=False,
-            start_parameter_services=False,
-        )
-    except InvalidNamespaceException as error:
-        raise ParameterError(
-            f'--namespace {namespace!r} cannot be one: letters, digits, _ and /'
-        ) from error
+def bare_node(name: str, namespace: str, context: Context) -> Iterator[Node]:
+    """A node without a log topic and services of parameters, for as long as it is asked."""
+    node = EventlessNode(
+        name,
+        context=context,
+        namespace=namespace,
+        enable_rosout=False,
+        start_parameter_services=False,
+    )
     try:
         yield node
     finally:

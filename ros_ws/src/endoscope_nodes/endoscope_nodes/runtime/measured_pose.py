@@ -23,8 +23,7 @@ _STAMP_END = 12
 class MeasuredPose:
     """Where shafts and bending section are: what whoever enters a session starts from.
 
-    One serves all nodes of a process, because a subscription of each node's own would cost more
-    than most nodes do; `listen` lets another of them host the subscriptions.
+    One serves all nodes of a process: a subscription each would cost more than most nodes do.
     """
 
     def __init__(self, node: Node, ticker: Ticker, rig: Rig) -> None:

@@ -1,7 +1,6 @@
 """What the nodes of a process share, and what each is given when it is made."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rclpy.context import Context
@@ -22,7 +21,7 @@ from endoscope_nodes.runtime.declared_parameters import (
     declare_parameters,
     given_to_nodes,
 )
-from endoscope_nodes.runtime.eventless_node import EventlessNode
+from endoscope_nodes.runtime.environment import bare_node
 from endoscope_nodes.runtime.measured_pose import MeasuredPose
 from endoscope_nodes.runtime.node_parameters import BeatParameters, RealTimeParameters
 from endoscope_nodes.runtime.parameters import ParameterError, changed
@@ -61,9 +60,8 @@ def load_slave(source: str, path: str) -> PlantDescription:
 def all_matched(nodes: Sequence[Node]) -> bool:
     """Say whether no message between these nodes would be lost from now on.
 
-    Both sides have to know of each other, and each finds the other at its own time. Endpoints of
-    other nodes do not count. A node of this process that reads topics by other means than
-    subscriptions of its own lists them in ``extra_readers() -> [(topic, publishers found)]``.
+    Both sides have to know of each other. A node that reads topics past its subscriptions lists
+    them in ``extra_readers() -> [(topic, publishers found)]``.
     """
     here = {(node.get_name(), node.get_namespace()) for node in nodes}
     for node in nodes:
@@ -83,10 +81,7 @@ def all_matched(nodes: Sequence[Node]) -> bool:
 
 
 class NodeContext:
-    """Rig, ticker, measured pose and parameter overrides of a process, for its nodes.
-
-    As :class:`~endoscope_nodes.runtime.runtime.Runtime`, which is one, takes them.
-    """
+    """Rig, ticker, measured pose and parameter overrides of a process, for its nodes."""
 
     def __init__(
         self,
@@ -115,7 +110,7 @@ class NodeContext:
 
     def given(self, name: str) -> dict[str, object]:
         """Parameter values that the command line has for a node of this name."""
-        with self._asked(name) as node:
+        with bare_node(name, NAMESPACE, self.context) as node:
             # rclpy has no public way to what the command line gave.
             given = node._parameter_overrides  # noqa: SLF001
             values = {key: value.value for key, value in given.items()}
@@ -125,24 +120,10 @@ class NodeContext:
         """Value that this process was asked to give a node's parameter; None for none."""
         return {**self.given(name), **self._overrides.get(name, {})}.get(parameter)
 
-    @contextmanager
-    def _asked(self, name: str) -> Iterator[Node]:
-        node = EventlessNode(
-            name,
-            context=self.context,
-            namespace=NAMESPACE,
-            enable_rosout=False,
-            start_parameter_services=False,
-        )
-        try:
-            yield node
-        finally:
-            node.destroy_node()
-
     def keep_lock_step(self, clock: Mapping[str, object]) -> None:
         """Simulate time though nobody has asked for it; call it before the first node is added."""
         self.chosen = {**clock, **self.given(CLOCK_NODE)}
-        with self._asked(CLOCK_NODE) as node:
+        with bare_node(CLOCK_NODE, NAMESPACE, self.context) as node:
             # Two rigs of a domain do not share a clock.
             if node.get_namespace() != f'/{NAMESPACE}':
                 self.clock = CLOCK.strip('/')

@@ -26,10 +26,7 @@ from endoscope_core.exit_status import ClosedOnExit
 from endoscope_core.rig import Rig
 from endoscope_nodes.runtime.declared_parameters import check_overrides
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
-from endoscope_nodes.runtime.environment import (
-    log_as_asked,
-    stay_on_this_machine,
-)
+from endoscope_nodes.runtime.environment import log_as_asked, stay_on_this_machine
 from endoscope_nodes.runtime.node_context import NodeContext, all_matched
 from endoscope_nodes.runtime.parameters import ParameterError, as_typed
 from endoscope_nodes.runtime.real_time import (
@@ -57,15 +54,8 @@ _PATIENCE_LOOKS = 25
 class Runtime(NodeContext, ClosedOnExit):
     """Nodes composed in one process around one executor, one ticker and one context.
 
-    By default it takes the command line of the process, its context, the ROS domain of the
-    environment, and the rig that the parameter `rig_file` of the first node names. `overrides`, by
-    node name, win over the command line's. Unreadable ROS arguments raise `ParameterError`.
-
-    Examples
-    --------
-    >>> with Runtime() as runtime:            # doctest: +SKIP
-    ...     runtime.add(MasterNode)
-    ...     runtime.spin()
+    By default it takes command line and ROS domain of the process, and the rig that the first node
+    names. `overrides`, by node, win. Unreadable ROS arguments raise `ParameterError`.
     """
 
     def __init__(
@@ -244,10 +234,7 @@ def run(compose: Callable[[Runtime], None], args: Sequence[str] | None = None) -
 
 
 class Announcement:
-    """Says once that the nodes of a process can be operated, and what to do next.
-
-    That is when they have found each other and none of them waits for anything.
-    """
+    """Says once that all nodes have found each other and wait for nothing, and what is next."""
 
     def __init__(
         self, nodes: Sequence[EndoscopeNode], process_parameters: Mapping[str, object]

@@ -16,8 +16,7 @@ from rclpy.qos import QoSProfile
 from rclpy.type_support import check_for_type_support
 from sensor_msgs.msg import JointState
 
-from endoscope_bags.cdr_decoding import QUANTITIES, joint_state_layout
-from endoscope_bags.cdr_encoding import encode_joint_state
+from endoscope_bags.cdr import QUANTITIES, encode_joint_state, joint_state_layout
 from endoscope_bags.errors import MalformedMessageError
 
 _SECOND = 1_000_000_000

@@ -7,13 +7,7 @@ from geometry_msgs.msg import TwistStamped
 from endoscope_core.control.velocity_stream import VelocityStream
 from endoscope_core.kinematics import TipVelocity
 from endoscope_core.safety import Refusal
-from endoscope_nodes.names import (
-    JOINTS,
-    MASTER_NODE,
-    SLAVE_COMMAND,
-    SLAVE_VELOCITY,
-    TIP_VELOCITY,
-)
+from endoscope_nodes.names import JOINTS, MASTER_NODE, SLAVE_COMMAND, SLAVE_VELOCITY, TIP_VELOCITY
 from endoscope_nodes.runtime.diagnostics import ERROR, OK, WARN, Report
 from endoscope_nodes.runtime.endoscope_node import EndoscopeNode
 from endoscope_nodes.runtime.qos import COMMAND
@@ -24,10 +18,7 @@ _VELOCITIES = (SLAVE_VELOCITY, TIP_VELOCITY)
 
 
 def rivals_in_motion(node: EndoscopeNode) -> str:
-    """Name all senders of positions and velocities; empty where there is but one, or the master.
-
-    The master's positions are made of the velocities of another sender.
-    """
+    """Name all senders of positions and velocities, if several besides the master."""
     if not any(map(node.count_publishers, _VELOCITIES)):
         return ''
     master = MASTER_NODE, node.get_namespace()

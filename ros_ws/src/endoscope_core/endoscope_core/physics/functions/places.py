@@ -345,13 +345,7 @@ FUNCTIONS: dict[str, Place] = in_order_of_chain(Place)
 
 
 def describe_place(place_id: str) -> Place:
-    """The place of that id.
-
-    Raises
-    ------
-    InputError
-        If there is none; the message names the nearest.
-    """
+    """The place of that id; an InputError names the nearest."""
     if place_id not in FUNCTIONS:
         raise InputError(f'unknown place {place_id}: {nearest(place_id, FUNCTIONS)}')
     return FUNCTIONS[place_id]
