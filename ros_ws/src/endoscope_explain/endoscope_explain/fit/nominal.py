@@ -34,7 +34,7 @@ from endoscope_explain.recording import RigRecording, signal_name
 Array = NDArray[np.float64]
 
 SPIKE = 8.0
-"""Height in noise units of a residual that stands alone."""
+"""Height in noise units of a residual that stands alone: of 4, right samples have it as well."""
 ALONE = 5.0
 """Factor by which it is above the usual residual nearby."""
 NEARBY = 15
