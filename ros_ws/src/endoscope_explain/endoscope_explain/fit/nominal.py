@@ -34,7 +34,7 @@ from endoscope_explain.options import BAND
 from endoscope_explain.recording import MOVES_RAD, Array, Mask, RigRecording, Series, signal_name
 
 SPIKE = 8.0
-"""Height in noise units of a residual that stands alone."""
+"""Height in noise units of a residual that stands alone: of 4, right samples have it as well."""
 ALONE = 5.0
 """Factor by which it is above the usual residual nearby."""
 NEARBY = 15

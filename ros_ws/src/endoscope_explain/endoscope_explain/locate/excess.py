@@ -131,8 +131,10 @@ def _correlation_time(values: Array) -> float:
 
 GRID_S = 0.01
 AFTER_REVERSAL_RAD = 0.15
-"""Travel of the motor (joint-equivalent) that counts as just after a reversal."""
+"""Travel of the motor (joint-equivalent) that counts as just after a reversal: half misses that a
+backlash shows there."""
 STANDING_RAD_PER_S = 0.02
+"""Speed of the motor (joint-equivalent) up to which it holds, far below that of any wide stroke."""
 
 
 def conditions(recording: RigRecording, j: int) -> dict[str, Mask]:
@@ -223,8 +225,10 @@ def _after_reversal(motor: Array, speed: Array) -> Mask:
 
 
 LEAST_NATS = 0.08
-"""Information that a state must give about where the excess is to be worth a word."""
+"""Information that a state must give about where the excess is to be worth a word: half or double
+changes the words of one mismatch in 30."""
 SHIFTS = 99
+"""Of the excess in time; a state is named where at most a tenth of them show as much."""
 
 
 def regime_in_words(excesses: Sequence[SignalExcess], states: Mapping[str, Mask]) -> str:
