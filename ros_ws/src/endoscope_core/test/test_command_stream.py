@@ -49,8 +49,8 @@ class Slave:
 
     def feel(self, force):
         """Have a force on the first joint that is certain, in N."""
-        low, high = (force - 0.02, 0.0), (force + 0.02, 0.0)
-        for _ in range(CERTAIN):
+        for k in range(CERTAIN):
+            low, high = (force - 0.02, 0.0), (force + 0.02 - 1e-6 * k, 0.0)
             self.stream.contact.feel(FeltForce(self.now_ns, (force, 0.0), low, high))
 
     def watch(self, pause_ms=0):

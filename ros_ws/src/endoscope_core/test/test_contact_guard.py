@@ -28,6 +28,7 @@ class Bench:
     def feel(self, *forces, half_width=0.02):
         """Estimates one after the other; a single one is so often that it is certain."""
         for force in forces if len(forces) > 1 else forces * CERTAIN:
+            half_width += 1e-6
             low, high = force - half_width, force + half_width
             self.guard.feel(FeltForce(self.now_ns, (force, NAN), (low, NAN), (high, NAN)))
 
@@ -101,8 +102,16 @@ def test_when_the_obstacle_gives_way_the_slave_does_not_leap():
     bench.feel(-0.2)
     bench.go(*ramp(0.5, 1.0))
     bench.feel(0.0)
+    assert bench.guard.in_words() == (
+        'yielding: nothing pushes bend_x any more: follows the hand at 5 mm/s'
+    )
     before = bench.sent
     assert bench.go(1.0) - before == pytest.approx(RELEASED)
+    # It may be more than the limit, and may be nothing.
+    bench.guard.feel(FeltForce(bench.now_ns, (-0.11, NAN), (-0.2, NAN), (0.0, NAN)))
+    before = bench.sent
+    assert bench.go(1.0, 1.01) - before == pytest.approx(MOST)
+    bench.feel(0.0)
     bench.go(bench.sent)
     assert bench.guard.in_words() == 'watching'
     assert bench.go(1.0) == 1.0
@@ -159,8 +168,13 @@ def test_a_force_that_is_not_certain_or_below_the_limit_is_only_watched():
     for force, half_width in ((-0.2, 0.3), (-0.09, 0.01)):
         bench.feel(force, half_width=half_width)
         assert bench.guard.state is not GuardState.YIELDING, force
+    # The same one again, of a joint at rest and by another lever.
+    for lever in (1.0, 1.001, 0.999):
+        force, low, high = (-0.2 * lever, NAN), (-0.25 * lever, NAN), (-0.15 * lever, NAN)
+        bench.guard.feel(FeltForce(bench.now_ns, force, low, high))
+    assert bench.guard.state is not GuardState.YIELDING
     # Never twice in a row on one side, nor with silence between.
-    bench.feel(-0.2, 0.2, -0.2, 0.0, -0.2, NAN, -0.2)
+    bench.feel(0.0, -0.2, 0.2, -0.2, 0.0, -0.2, NAN, -0.2)
     bench.wait(SILENT_NS // MS + 1)
     bench.feel(-0.2, 0.0)
     assert bench.guard.state is not GuardState.YIELDING
@@ -187,7 +201,9 @@ class AnyHand(RuleBasedStateMachine):
         self.now_ns = 1_000 * MS
         self.sent = None
         self.asked = (0.0, 0.0)
-        self.pushed = ()  # signs of both forces, where the newest one is certain
+        # Signs of both forces where the newest one is certain, and where several in a row are above
+        # the limit.
+        self.certain = self.pushed = ()
         self.felt_ns = 0
 
     @rule(angle=ANGLES)
@@ -210,15 +226,16 @@ class AnyHand(RuleBasedStateMachine):
         both = (force, -force)
         low, high = (tuple(f + w for f in both) for w in (-half_width, half_width))
         age_ns = age_ms * MS
-        for _ in range(count):
-            self.guard.feel(FeltForce(self.now_ns - age_ns, both, low, high))
+        for more in range(count, 0, -1):
+            wider = tuple(x - 1e-6 * more for x in low), tuple(x + 1e-6 * more for x in high)
+            self.guard.feel(FeltForce(self.now_ns - age_ns, both, *wider))
         if self.now_ns - age_ns < self.felt_ns:
             return
-        certain = count >= CERTAIN and abs(force) - half_width > 0.0
-        certain &= LIMIT < abs(force) < math.inf
         sign = math.copysign(1.0, force)
         self.felt_ns = self.now_ns - age_ns
-        self.pushed = (sign, -sign) if certain and half_width >= 0.0 else ()
+        certain = 0.0 <= half_width < abs(force) - 1e-5 < math.inf
+        self.certain = (sign, -sign) if certain else ()
+        self.pushed = self.certain if count >= CERTAIN and abs(force) > LIMIT else ()
 
     @rule(ms=st.integers(0, 500))
     def wait(self, ms):
@@ -241,11 +258,15 @@ class AnyHand(RuleBasedStateMachine):
             if not yielding:
                 assert (sent, velocity) == (target, speeds)
             for k, (before, now) in enumerate(zip(self.sent, sent, strict=True)):
-                if self.pushed and self.now_ns - self.felt_ns <= SILENT_NS:
+                fresh = self.now_ns - self.felt_ns <= SILENT_NS
+                if self.pushed and fresh:
                     assert self.pushed[k] * (before - now) <= MOST + ROUNDING
                 owed = self.asked[k] - before
                 if owed:
-                    assert math.copysign(1.0, owed) * (now - before) <= RELEASED + ROUNDING
+                    side = math.copysign(1.0, owed)
+                    against = fresh and self.certain and self.certain[k] == -side
+                    most = MOST if against else RELEASED
+                    assert side * (now - before) <= most + ROUNDING
             assert self.guard.state is GuardState.YIELDING or sent == target
             self.sent, self.asked = sent, target
 

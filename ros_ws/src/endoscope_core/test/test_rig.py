@@ -31,6 +31,10 @@ def test_what_a_file_does_not_say_is_as_shipped(tmp_path):
             "motors is 'dynamicsel': give one of simulated, dynamixel",
         ),
         ('simulation: {seed: -1}', 'simulation.seed is -1: give a whole number from 0 on'),
+        (
+            'tip: {release_speed: 5.0e-5}',
+            'tip.release_speed 5e-05 m/s is less than',
+        ),
         ('tip: {force_limit: 0}', 'tip.force_limit is 0: give a number from 0.001 to 100'),
         ('instrument: {section_length: 20}', 'section_length is 20: give a number from 0.001 to'),
         ('instrument: {base_frame: /base}', "base_frame is '/base': give a name of letters"),

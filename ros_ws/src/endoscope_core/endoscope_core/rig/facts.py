@@ -174,6 +174,11 @@ class Rig:
                 f'joints.drive {self.joints.drive:g} rad is less than joints.reach '
                 f'{self.joints.reach:g} rad: the motors could not follow up to the reach'
             )
+        if self.tip.release_speed < self.tip.contact_speed:
+            raise ValueError(
+                f'tip.release_speed {self.tip.release_speed:g} m/s is less than tip.contact_speed '
+                f'{self.tip.contact_speed:g} m/s: the tip would be slower once nothing pushes'
+            )
         shaft = self.joints.drive * self.joints.gear
         if shaft > self.motors.reach:
             raise ValueError(

@@ -8,6 +8,7 @@ from typing import NamedTuple
 SILENT_NS = 350_000_000
 """Age of an estimate from which nothing is known: an estimate is 0.1 s late, and ten of them, 40 a
 second, are missed."""
+_SAME = 1e-9
 CERTAIN = 2
 """Estimates in a row that have to push too hard. An alarm waits for eight, by which a hand has gone
 on; a false contact costs a moment at contact speed."""
@@ -65,6 +66,7 @@ class _Joint:
         self.pushed = 0.0  # sign of the motion against a force that is certain
         self.towards = 0.0  # and against one above the limit
         self._pressed = 0  # estimates in a row that are certain of that
+        self._last = (0.0, 0.0, 0.0)  # of them, force and bounds in N
 
     @property
     def yielding(self) -> bool:
@@ -72,6 +74,14 @@ class _Joint:
 
     def is_known(self, now_ns: int) -> bool:
         return self.known_ns is not None and now_ns - self.known_ns <= SILENT_NS
+
+    def is_eased(self, side: _Side, now_ns: int) -> bool:
+        """Whether the force on a side is known to be no more than the limit."""
+        return self.is_known(now_ns) and self.towards != side.sign
+
+    def is_released(self, side: _Side, now_ns: int) -> bool:
+        """Whether in addition nothing may push there."""
+        return self.is_eased(side, now_ns) and self.pushed != side.sign
 
     def feel(self, felt: FeltForce, j: int, limit: float, target: float) -> None:
         force, low, high = felt.force[j], felt.low[j], felt.high[j]
@@ -82,11 +92,17 @@ class _Joint:
         if not certain and 0.5 * (high - low) > limit:
             return  # a force at the limit would be hidden
         before = self.towards if self.is_known(felt.time_ns) else 0.0
+        # At rest an estimate is the last one again, by a lever that is measured anew.
+        last, self._last = self._last, (force, low, high)
+        again = all(
+            math.isclose(now * last[0], then * force, rel_tol=_SAME)
+            for now, then in zip(self._last, last, strict=True)
+        )
         self.known_ns, self.force = felt.time_ns, force
         self.pushed = -math.copysign(1.0, force) if certain else 0.0
         self.towards = -math.copysign(1.0, force) if abs(force) > limit else 0.0
         if certain and self.towards:
-            self._pressed = pressed + 1 if self.towards == before else 1
+            self._pressed = pressed + (not again) if self.towards == before else 1
         if self._pressed >= CERTAIN:
             for side in self.sides:
                 if side.sign == self.towards:
@@ -182,9 +198,9 @@ class ContactGuard:
             moved = side.sign * (target - before)
             if not side.yielding:
                 continue
-            eased = known and joint.towards != side.sign
+            eased = joint.is_eased(side, self._now_ns)
             if moved >= 0.0:
-                released = known and joint.pushed != side.sign
+                released = joint.is_released(side, self._now_ns)
                 most = way * (self.release if released else self.speed)
                 kept = side.move(before, target, most, not eased)
             else:
@@ -227,12 +243,25 @@ class ContactGuard:
         state, reason = self.state, self.reason
         if state is not GuardState.YIELDING:
             return f'{state}: {reason}' if reason else str(state)
-        pushes = ' and '.join(
-            f'{name} {"pushed" if reason else "pushes"} with {abs(joint.force):.2f} N'
-            for name, joint in zip(self._names, self._joints, strict=True)
-            if joint.yielding
-        )
-        limits = (
-            f'(limit {self.limit:.2f} N): towards the contact only at {self.speed * 1e3:g} mm/s'
-        )
-        return f'{state}: {pushes} {limits}{f"; now {reason}" if reason else ""}'
+        pushes, released = list[str](), list[str]()
+        for name, joint in zip(self._names, self._joints, strict=True):
+            sides = [side for side in joint.sides if side.yielding]
+            if sides and all(joint.is_released(side, self._now_ns) for side in sides):
+                released.append(name)
+            elif sides:
+                verb = 'pushed' if reason else 'pushes'
+                pushes.append(f'{name} {verb} with {abs(joint.force):.2f} N')
+        parts = []
+        if pushes:
+            parts.append(
+                f'{" and ".join(pushes)} (limit {self.limit:.2f} N): '
+                f'towards the contact only at {self.speed * 1e3:g} mm/s'
+            )
+        if released:
+            parts.append(
+                f'nothing pushes {" and ".join(released)} any more: '
+                f'follows the hand at {self.release * 1e3:g} mm/s'
+            )
+        if reason:
+            parts.append(f'now {reason}')
+        return f'{state}: {"; ".join(parts)}'

@@ -98,7 +98,7 @@ def _moment_for(
     q = _bent(begin, *joint, first, out)
     low, high, q_low, q_high = first, first, q, q
     # What was found for another angle of the block, or the one before, is mostly right again.
-    step = max(_FIRST_STEP, stiffness[0] * abs(angle - q))
+    step = min(max(_FIRST_STEP, stiffness[0] * abs(angle - q)), LARGEST_MOMENT)
     while q_high < angle - _ANGLE_PRECISION and high < LARGEST_MOMENT:
         low, q_low = high, q_high
         high += step

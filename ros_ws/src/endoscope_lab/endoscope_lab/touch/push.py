@@ -67,9 +67,10 @@ class Push:
     without: float  # largest force without the guard
     guarded: float  # and with it
     at_end: float  # with it, when the hand has held for 1.5 s
-    # From touching until the guard yields, s; infinite where it does not, negative where it yields
-    # before, and NaN where it has nothing to yield to.
+    # From the limit until the guard yields, s; infinite where it does not, and NaN where it has
+    # nothing to yield to.
     late: float
+    early: bool  # whether it yields before it touches
     when_yielding: float  # force then; the largest where it does not yield
 
     @property
@@ -128,7 +129,11 @@ class _Compensator:
 
     @property
     def yields(self) -> bool:
-        return self._stream.contact.state is GuardState.YIELDING
+        """Whether the joint that is pushed does."""
+        contact = self._stream.contact
+        return (
+            contact.state is GuardState.YIELDING and JOINTS[self._hand.met.joint] in contact.joints
+        )
 
     def feel(self, force: TipForce) -> None:
         force_n, low, high = (tuple(x.tolist()) for x in (force.force, force.low, force.high))
@@ -156,8 +161,8 @@ def judged(simulator: str, seed: int) -> Push:
         guarded, yielded = _guarded(ready, hand, free, seed + 2)
         time, without = _force(ready, hand, free, seed + 2)
         _, force = _force(ready, hand, guarded, seed + 2)
-    touching = time[force > 0.0]
-    touched = touching[0] if len(touching) else math.inf
+    limit = shipped_rig().tip.force_limit
+    touched, above = (next(iter(time[force > least]), math.inf) for least in (0.0, limit))
     return Push(
         simulator,
         seed,
@@ -166,7 +171,8 @@ def judged(simulator: str, seed: int) -> Push:
         float(without.max()),
         float(force.max()),
         float(force[-1]),
-        float(yielded - touched),
+        float(yielded - above),
+        bool(yielded < touched),
         float(np.interp(yielded, time, force)) if yielded < math.inf else float(force.max()),
     )
 
@@ -174,14 +180,16 @@ def judged(simulator: str, seed: int) -> Push:
 def _guarded(ready: Prepared, hand: _Hand, free: Array, seed: int) -> tuple[Array, float]:
     """What is sent with the guard (N, J) in rad, and when it yields to the push, in s."""
     compensator = _Compensator(ready.plant, hand, ready.later)
-    sent, yielded, felt = np.empty_like(free), math.inf, list[TipForce]()
+    sent, yielded = np.empty_like(free), math.inf
+    found, felt = list[TipForce](), list[TipForce]()
     foreseen = free
     recording, _ = ready.rig.record(foreseen, seed, hand.met)
     begins = range(0, len(free), _TICKS)
     for begin in begins:
-        # As in the graph: what came is worked out beside it, and known a block later.
+        # As in the graph: what came is worked out beside the next block, and known after it.
         for force in felt:
             compensator.feel(force)
+        felt = found
         end = begin + _TICKS
         sent[begin:end] = compensator.block(begin)
         if begin * TICK >= hand.begin and yielded == math.inf and compensator.yields:
@@ -193,7 +201,7 @@ def _guarded(ready: Prepared, hand: _Hand, free: Array, seed: int) -> tuple[Arra
             foreseen = np.concatenate([sent[:end], *rest])
             recording, _ = ready.rig.record(foreseen, seed, hand.met)
         between = (begin * TICK, end * TICK)
-        felt = portion(ready.estimator, recording, ready.later, between)
+        found = portion(ready.estimator, recording, ready.later, between)
     return sent, yielded
 
 
@@ -208,14 +216,14 @@ def _force(ready: Prepared, hand: _Hand, sent: Array, seed: int) -> tuple[Array,
 def print_pushes(rows: Sequence[Push]) -> None:
     """Print the largest forces, and what became of those that the guard can do something about."""
     limit = shipped_rig().tip.force_limit / AIM
-    columns = ('pushes', 'without', 'guarded', 'ratio', f'below {AIM}', 'yields after')
+    columns = ('pushes', 'without', 'guarded', 'ratio', f'below {AIM}', 'late')
     print(table_head('hand', *columns, 'by then', 'too early', 'never'))
     for fast in (False, True):
         hand = f'{"above" if fast else "below"} {_FAST:g} rad/s'
         of_hand = [r for r in rows if (r.speed > _FAST) == fast and r.without > 0.0]
         strong = [r for r in of_hand if r.without > limit]
-        for title, mine in ((hand, of_hand), (f'{hand}, {limit:.2f} N without', strong)):
-            acted = [r for r in mine if 0.0 <= r.late < math.inf]
+        for title, mine in ((hand, of_hand), (f'{hand}, above {limit:.2f} N without', strong)):
+            acted = [r for r in mine if not r.early and math.isfinite(r.late)]
             below = sum(r.ratio < AIM for r in mine)
             print(
                 table_row(
@@ -227,7 +235,7 @@ def print_pushes(rows: Sequence[Push]) -> None:
                     f'{below / max(1, len(mine)):.0%}',
                     _median_and_most([r.late for r in acted], ' s'),
                     _median_and_most([r.when_yielding for r in acted], ' N'),
-                    sum(r.late < 0.0 for r in mine),
+                    sum(r.early for r in mine),
                     sum(r.late == math.inf for r in mine),
                 )
             )

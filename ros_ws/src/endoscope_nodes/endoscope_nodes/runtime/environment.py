@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -125,15 +125,15 @@ def joined_node(name: str, namespace: str, domain: int | None = None) -> Iterato
     rclpy.init(
         args=[], context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO
     )
-    try:
-        with bare_node(name, f'/{namespace.strip("/")}', context) as node:
-            yield node
-    except InvalidNamespaceException as error:
-        raise ParameterError(
-            f'--namespace {namespace!r} cannot be one: letters, digits, _ and /'
-        ) from error
-    finally:
-        context.try_shutdown()
+    with ExitStack() as stack:
+        stack.callback(context.try_shutdown)
+        try:
+            node = stack.enter_context(bare_node(name, f'/{namespace.strip("/")}', context))
+        except InvalidNamespaceException as error:
+            raise ParameterError(
+                f'--namespace {namespace!r} cannot be one: letters, digits, _ and /'
+            ) from error
+        yield node
 
 
 @contextmanager
