@@ -13,7 +13,7 @@ from endoscope_core.kinematics import (
     bending_from_orientation,
     tip_pose,
 )
-from endoscope_core.physics import SensorModel, recording_faults
+from endoscope_core.physics import PlantDescription, SensorModel, recording_faults
 from endoscope_devices.em_tracker import (
     AuroraTracker,
     RegistrationWindow,
@@ -32,6 +32,27 @@ from endoscope_nodes.runtime.parameters import ParameterError
 from endoscope_nodes.runtime.qos import LOCK_STEP, SENSOR_OFFERED
 from endoscope_nodes.runtime.streams import JointPublisher, JointSample, JointSubscription
 from endoscope_nodes.runtime.ticker import SampleClock
+
+
+class _SimulatedTracker:
+    """Angles as the plant's tracker reads them, at its rate and with its faults."""
+
+    def __init__(self, plant: PlantDescription, seed: int) -> None:
+        self._seed = seed
+        self._sensors = SensorModel(plant.sensors, seed)
+        self._faults = recording_faults(plant)
+        self._first_ns: int | None = None
+        self._sampling = SampleClock(plant.sensors.tracker_rate)
+
+    def is_due(self, stamp_ns: int) -> bool:
+        return self._sampling.due(stamp_ns)
+
+    def read(self, sample: JointSample) -> np.ndarray:
+        """Angles (J,) in rad."""
+        if self._first_ns is None:
+            self._first_ns = sample.stamp_ns
+        since = (sample.stamp_ns - self._first_ns) * 1e-9
+        return self._faults.spoilt(self._sensors.bending(sample.position), since, self._seed)
 
 
 class EmTrackerNode(EndoscopeNode):
@@ -58,11 +79,7 @@ class EmTrackerNode(EndoscopeNode):
         )
         device = self._device_name = p.device or self.rig.devices.tracker
         if device == 'simulated':
-            plant, self._seed = context.plant, context.seed_of(2)
-            self._sensors = SensorModel(plant.sensors, self._seed)
-            self._faults = recording_faults(plant)
-            self._first_ns: int | None = None
-            self._sampling = SampleClock(plant.sensors.tracker_rate)
+            self._simulated = _SimulatedTracker(context.plant, context.seed_of(2))
             JointSubscription(
                 self, names.SIMULATED_BENDING, names.JOINTS, self._on_bending, LOCK_STEP
             )
@@ -96,12 +113,9 @@ class EmTrackerNode(EndoscopeNode):
         return tracker
 
     def _on_bending(self, sample: JointSample) -> None:
-        if not self._sampling.due(sample.stamp_ns) or not self._settings.in_volume:
+        if not self._simulated.is_due(sample.stamp_ns) or not self._settings.in_volume:
             return
-        if self._first_ns is None:
-            self._first_ns = sample.stamp_ns
-        since = (sample.stamp_ns - self._first_ns) * 1e-9
-        reading = self._faults.spoilt(self._sensors.bending(sample.position), since, self._seed)
+        reading = self._simulated.read(sample)
         if np.hypot(*reading) >= np.pi:
             self._out_of_reach += 1
             return

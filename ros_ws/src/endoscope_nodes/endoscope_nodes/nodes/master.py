@@ -216,10 +216,8 @@ class MasterNode(EndoscopeNode):
         refused = sum(handle.refused.values())
         fresh, self._refused_before = refused - self._refused_before, refused
         if fresh:
-            text = (
-                f'{fresh} messages of {names.MASTER_MEASURED} refused, last: {handle.last_reason}'
-            )
-            return WARN, text, values
+            text = f'{fresh} messages of {names.MASTER_MEASURED} refused'
+            return WARN, f'{text}, last: {handle.last_reason}', values
         unheeded = self._unheeded()
         if unheeded and not self._warned:
             self._warned = True

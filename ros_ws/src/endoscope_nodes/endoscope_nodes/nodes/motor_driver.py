@@ -29,6 +29,44 @@ from endoscope_nodes.safety.streams import CommandReport
 _REPEATED_NS = 50_000_000
 
 
+class _Setpoint:
+    """Publishes the goal of the shafts when it changes, and again after a while."""
+
+    def __init__(self, node: EndoscopeNode) -> None:
+        self._publisher = JointPublisher(
+            node, names.MOTOR_SETPOINT, names.MOTORS, ('position',), SENSOR_OFFERED
+        )
+        self._sent: tuple[float, ...] = ()
+        self._sent_ns = 0
+
+    def publish(self, since_ns: int, goal: tuple[float, ...]) -> None:
+        if goal and (goal != self._sent or since_ns - self._sent_ns >= _REPEATED_NS):
+            self._sent, self._sent_ns = goal, since_ns
+            self._publisher.publish(since_ns, *goal)
+
+
+class _KindOfRig:
+    """Publishes what kind of rig it is, and again where other servos were plugged in."""
+
+    def __init__(self, node: EndoscopeNode, device: MotorDevice, context: NodeContext) -> None:
+        self._device = device
+        self._publisher = node.create_publisher(String, names.RIG_KIND, RESULT)
+        program = f'endoscope {version("endoscope_nodes")}'
+        self._rig = RigKind(device.kind, program, digest(rig_as_text(node.rig)))
+        if self._rig.kind is Kind.SIMULATED:
+            plant = digest(plant_as_text(context.plant))
+            self._rig = replace(self._rig, plant=context.plant_name, plant_sha256=plant)
+        self._publish()
+
+    def follow(self) -> None:
+        if self._device.kind is not self._rig.kind:
+            self._rig = replace(self._rig, kind=self._device.kind)
+            self._publish()
+
+    def _publish(self) -> None:
+        self._publisher.publish(String(data=self._rig.as_text()))
+
+
 class MotorDriverNode(EndoscopeNode):
     """Obeys ``motor/servo_jp`` as far as it is safe, and publishes what the shafts do.
 
@@ -49,10 +87,11 @@ class MotorDriverNode(EndoscopeNode):
         commands = CommandLimits(facts.reach, 1.25 * facts.speed, facts.entry_step, timeout_ns)
         limits = (facts.reach, facts.speed, facts.acceleration, facts.step)
         self.motion = ShaftMotion(commands, MotionLimits.either_way(len(names.MOTORS), *limits))
-        self._slave = None
-        if device == 'simulated':
-            self._slave = SimulatedSlave(context.plant, names.MOTORS, context.seed_of(0))
-        self._device: MotorDevice = self._slave or self._dynamixel(bus)
+        self._device: MotorDevice = (
+            SimulatedSlave(context.plant, names.MOTORS, context.seed_of(0))
+            if device == 'simulated'
+            else self._dynamixel(bus)
+        )
         try:
             self._device.open()
         except DeviceError as error:
@@ -67,28 +106,22 @@ class MotorDriverNode(EndoscopeNode):
             ('position', 'velocity', 'effort'),
             SENSOR_OFFERED,
         )
-        self._setpoint = JointPublisher(
-            self, names.MOTOR_SETPOINT, names.MOTORS, ('position',), SENSOR_OFFERED
-        )
-        self._rig_kind = self._describe_rig(context)
-        self._kinds = self.create_publisher(String, names.RIG_KIND, RESULT)
-        self._tell_kind()
-        self._sent: tuple[float, ...] = ()
-        self._sent_ns = 0
+        self._setpoint = _Setpoint(self)
+        kind = _KindOfRig(self, self._device, context)
         self._torque = False
         if self._slave is not None:
-            self._wires = JointPublisher(
-                self, names.SIMULATED_WIRES, names.WIRES, ('effort',), LOCK_STEP
-            )
-            self._bending = JointPublisher(
-                self, names.SIMULATED_BENDING, names.JOINTS, ('position',), LOCK_STEP
+            self._sensors = (
+                JointPublisher(self, names.SIMULATED_WIRES, names.WIRES, ('effort',), LOCK_STEP),
+                JointPublisher(
+                    self, names.SIMULATED_BENDING, names.JOINTS, ('position',), LOCK_STEP
+                ),
             )
         self._state = ''
         self._session = SessionWatch(
             self, lambda: self._switch_torque(True), self._let_go, self.motion.session
         )
         self.create_subscription(String, names.OPERATING_STATE, self._on_state, RESULT)
-        self._commands = JointSubscription(
+        received = JointSubscription(
             self,
             names.MOTOR_COMMAND,
             names.MOTORS,
@@ -97,39 +130,23 @@ class MotorDriverNode(EndoscopeNode):
             exact=True,
             on_malformed=lambda reason: self.motion.gate.refuse(Refusal.MALFORMED, reason),
         )
-        self._senders = self._session.senders_of(self._commands.subscription)
+        self._senders = self._session.senders_of(received.subscription)
         self._session.obeys(names.MOTOR_COMMAND, self.motion.gate)
         self.diagnostics.add(
             'commands', CommandReport(self.motion.gate, self.ticker, self._session.leave)
         )
         self.diagnostics.add('device', self._report_device, device)
         self.ticker.add(self._on_tick)
-        self.ticker.every(1.0, self._follow_kind)
+        self.ticker.every(1.0, kind.follow)
 
     @property
     def announcement(self) -> str:
         """Name the device."""
         return f'motors {self._device_name}'
 
-    def _describe_rig(self, context: NodeContext) -> RigKind:
-        described = RigKind(
-            self._device.kind,
-            f'endoscope {version("endoscope_nodes")}',
-            digest(rig_as_text(self.rig)),
-        )
-        if described.kind is not Kind.SIMULATED:
-            return described
-        plant = digest(plant_as_text(context.plant))
-        return replace(described, plant=context.plant_name, plant_sha256=plant)
-
-    def _tell_kind(self) -> None:
-        self._kinds.publish(String(data=self._rig_kind.as_text()))
-
-    def _follow_kind(self) -> None:
-        # Other servos may have been plugged in.
-        if self._device.kind is not self._rig_kind.kind:
-            self._rig_kind = replace(self._rig_kind, kind=self._device.kind)
-            self._tell_kind()
+    @property
+    def _slave(self) -> SimulatedSlave | None:
+        return self._device if isinstance(self._device, SimulatedSlave) else None
 
     def _dynamixel(self, parameters: DynamixelParameters) -> MotorDevice:
         self.require_real_time(self._device_name)
@@ -165,20 +182,22 @@ class MotorDriverNode(EndoscopeNode):
         goal = self.motion.turn(self.ticker.monotonic_ns(), periods * TICK_S)
         self._session.publish()
         reading = self._device.exchange(goal or (0.0,) * len(names.MOTORS), periods)
-        if self._slave is not None:
+        slave = self._slave
+        if slave is not None:
             # The plant has just gone on under it for these periods.
-            self._tell_setpoint(stamp_ns - periods * TICK_NS, self._slave.goal)
+            self._setpoint.publish(stamp_ns - periods * TICK_NS, slave.goal)
         elif self._torque:
-            self._tell_setpoint(self.ticker.now_ns(), goal)
+            self._setpoint.publish(self.ticker.now_ns(), goal)
         if reading is None:
             return
         self.motion.measure(reading.position)
-        if self._slave is None:
+        if slave is None:
             stamp_ns = self.ticker.now_ns() - round(reading.age * 1e9)
         self._measured.publish(stamp_ns, *reading.position, *reading.velocity, *reading.effort)
-        if self._slave is not None:
-            self._wires.publish(stamp_ns, *self._slave.tension)
-            self._bending.publish(stamp_ns, *self._slave.bending)
+        if slave is not None:
+            wires, bending = self._sensors
+            wires.publish(stamp_ns, *slave.tension)
+            bending.publish(stamp_ns, *slave.bending)
 
     def _judge_what_arrived(self) -> None:
         """Take commands by the session of the turn that gives the goal."""
@@ -196,11 +215,6 @@ class MotorDriverNode(EndoscopeNode):
             if refusal is None and not self.ticker.simulated:
                 self.latency_ns.append(received_ns - self.ticker.monotonic_of(sample.stamp_ns))
         self._arrived.clear()
-
-    def _tell_setpoint(self, since_ns: int, goal: tuple[float, ...]) -> None:
-        if goal and (goal != self._sent or since_ns - self._sent_ns >= _REPEATED_NS):
-            self._sent, self._sent_ns = goal, since_ns
-            self._setpoint.publish(since_ns, *goal)
 
     def _notice_trouble(self) -> None:
         """Tell a trouble of the device in the tick in which it comes or goes."""

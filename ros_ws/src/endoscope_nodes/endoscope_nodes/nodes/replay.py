@@ -53,8 +53,7 @@ class ReplayNode(EndoscopeNode):
         self._start_ns = self._next.log_ns // TICK_NS * TICK_NS
         self._clock_ns = self._start_ns - TICK_NS
         self._clock_out = self.create_publisher(ClockMessage, CLOCK, LOCK_STEP) if p.clock else None
-        self._delay_ns = round(p.delay * 1e9)
-        self._begin_ns = time.monotonic_ns() + self._delay_ns
+        self._begin_ns = time.monotonic_ns() + round(p.delay * 1e9)
         self._wait_until_ns = self._begin_ns + _LONGEST_WAIT_NS
         self._checked = p.beside_live_nodes
         self.published = 0  # messages sent so far
@@ -88,7 +87,7 @@ class ReplayNode(EndoscopeNode):
     def _go_on(self) -> None:
         now = time.monotonic_ns()
         if not self.published and now < self._wait_until_ns and not self._connected():
-            self._begin_ns = now + self._delay_ns
+            self._begin_ns = now + round(self._parameters_.delay * 1e9)
         if now < self._begin_ns or self._next is None:
             return
         if not self._checked:

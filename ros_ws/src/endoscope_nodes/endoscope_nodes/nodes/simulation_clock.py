@@ -5,6 +5,7 @@ import struct
 import time
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 
 from rclpy.clock import Clock, ClockType
 from rclpy.task import Future
@@ -32,6 +33,59 @@ class BarrierTimeout(EndoscopeError, TimeoutError):
     """A topic did not answer a tick; the message names it."""
 
 
+class _Barrier:
+    """Streams whose answer a tick waits for: those asked for, and others that answered before."""
+
+    def __init__(self, settings: SimulationClockParameters, ours: Callable[[str], bool]) -> None:
+        self._settings, self._ours = settings, ours
+        self._answered = dict.fromkeys(FOLLOWED, 0)  # stamps in ns
+        self._tracker = SampleClock(settings.tracker_rate)
+        self._now_ns = 0
+        self.pending: set[str] = set()
+
+    def answer(self, topic: str, data: bytes) -> None:
+        seconds, nanoseconds = _STAMP.unpack_from(data, 4)
+        self._answered[topic] = seconds * 1_000_000_000 + nanoseconds
+        if self._answered[topic] >= self._now_ns:
+            self.pending.discard(topic)
+
+    def begin(self, before: int, now: int) -> None:
+        """Wait for a tick; both stamps in ns."""
+        self._now_ns = now
+        tracked = self._tracker.due(now)
+        self.pending.update(self._settings.wait_for)
+        for topic, stamp in self._answered.items():
+            if self._ours(topic):
+                continue
+            if topic == SLAVE_MEASURED:
+                if tracked and now - stamp < 1.5e9 / self._settings.tracker_rate:
+                    self.pending.add(topic)
+            elif stamp == before:
+                self.pending.add(topic)
+
+    def give_up(self) -> None:
+        """Wait only for those asked for."""
+        self.pending.intersection_update(self._settings.wait_for)
+
+
+class _Pace:
+    """When the next tick is due, in real time."""
+
+    def __init__(self, period_ns: int) -> None:
+        self.period_ns, self._due_ns = period_ns, 0
+
+    def begin(self) -> None:
+        self._due_ns = time.monotonic_ns()
+
+    def is_due(self) -> bool:
+        """Whether it is, after which the one after it comes a period later."""
+        now = time.monotonic_ns()
+        if now < self._due_ns:
+            return False
+        self._due_ns = max(self._due_ns + self.period_ns, now - _DEBT_NS)
+        return True
+
+
 class SimulationClockNode(EndoscopeNode):
     """Publishes ``/clock`` in lock-step with the graph, at most at a pace of ``speed``.
 
@@ -44,17 +98,15 @@ class SimulationClockNode(EndoscopeNode):
     def __init__(self, context: NodeContext) -> None:
         super().__init__(CLOCK_NODE, context)
         p = self.parameters(SimulationClockParameters)
-        self._process = context
         self._settings = p
         self._tick_ns = 1_000_000_000 // self.ticker.rate
-        self._period_ns = round(self._tick_ns / p.speed) if p.speed > 0.0 else 0
-        self._due_ns = 0
+        period_ns = round(self._tick_ns / p.speed) if p.speed > 0.0 else 0
+        self._pace = _Pace(period_ns) if period_ns else None
         self._now_ns = round(p.start * 1e9) - self._tick_ns
         self._until_ns = self._now_ns
-        self._answered: dict[str, int] = dict.fromkeys(FOLLOWED, 0)
-        self._full_name = {topic: self.resolve_topic_name(topic) for topic in FOLLOWED}
-        self._pending: set[str] = set()
-        self._tracker = SampleClock(p.tracker_rate)
+        full_name = {topic: self.resolve_topic_name(topic) for topic in FOLLOWED}
+        in_flight = self.ticker.in_flight
+        self._barrier = _Barrier(p, lambda topic: in_flight.sent_by_us(full_name[topic]))
         self._looked = 0
         self._look_s = min(p.grace, p.timeout) / 2
         self._course: deque[tuple[int, int]] = deque(
@@ -64,21 +116,21 @@ class SimulationClockNode(EndoscopeNode):
         self.ticks = 0
         self.failure: BarrierTimeout | None = None
         self._clock_out = self.create_publisher(ClockMessage, context.clock, LOCK_STEP)
-        self.ticker.in_flight.landed = self._go_on
+        in_flight.landed = self._go_on
         for topic in FOLLOWED:
-            answer = self._answer_to(topic)
-            if self.ticker.in_flight.sent_by_us(self._full_name[topic]):
+            answer = partial(self._barrier.answer, topic)
+            if in_flight.sent_by_us(full_name[topic]):
                 # The next tick waits for its readers as it is.
-                self.ticker.in_flight.note(self._full_name[topic], answer)
+                in_flight.note(full_name[topic], answer)
             else:
                 self.create_subscription(
                     JointState, topic, self._going_on(answer), LOCK_STEP, raw=True
                 )
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(self._look_s, self._look, clock=steady)
-        if self._period_ns:
+        if self._pace is not None:
             self.ticker.paced = True
-            self.create_timer(self._period_ns * 1e-9, self._go_on, clock=steady)
+            self.create_timer(self._pace.period_ns * 1e-9, self._go_on, clock=steady)
         self.diagnostics.add('lock-step', self._report)
 
     def advance(self, seconds: float) -> Future:
@@ -86,7 +138,8 @@ class SimulationClockNode(EndoscopeNode):
         self._until_ns = self._now_ns + round(seconds * 1e9)
         self._future = Future()
         self._looked = 0
-        self._due_ns = time.monotonic_ns()
+        if self._pace is not None:
+            self._pace.begin()
         if not self._is_waiting:
             self._step()
         return self._future
@@ -96,39 +149,26 @@ class SimulationClockNode(EndoscopeNode):
         """Stamp of the last tick."""
         return self._now_ns
 
-    def _answer_to(self, topic: str) -> Callable[[bytes], None]:
-        answered, pending = self._answered, self._pending
-
-        def answer(data: bytes) -> None:
-            seconds, nanoseconds = _STAMP.unpack_from(data, 4)
-            answered[topic] = seconds * 1_000_000_000 + nanoseconds
-            if answered[topic] >= self._now_ns:
-                pending.discard(topic)
-
-        return answer
-
     def _going_on(self, answer: Callable[[bytes], None]) -> Callable[[bytes], None]:
         def take(data: bytes) -> None:
-            waited = len(self._pending)
+            waited = len(self._barrier.pending)
             answer(data)
-            if len(self._pending) < waited:
+            if len(self._barrier.pending) < waited:
                 self._go_on()
 
         return take
 
     @property
     def _is_waiting(self) -> bool:
-        return bool(self._pending or self.ticker.in_flight.count)
+        return bool(self._barrier.pending or self.ticker.in_flight.count)
 
     def _go_on(self) -> None:
         """Give the next tick if the last one is answered and, where there is a pace, it is due."""
         if self._is_waiting:
             return
-        if self._period_ns:
-            now = time.monotonic_ns()
-            if now < self._due_ns:
+        if self._pace is not None:
+            if not self._pace.is_due():
                 return
-            self._due_ns = max(self._due_ns + self._period_ns, now - _DEBT_NS)
             self.ticker.turn_hand()
         self._step()
 
@@ -141,16 +181,7 @@ class SimulationClockNode(EndoscopeNode):
         before = self._now_ns
         self._now_ns = now = before + self._tick_ns
         self.ticks += 1
-        tracked = self._tracker.due(now)
-        self._pending.update(self._settings.wait_for)
-        for topic, stamp in self._answered.items():
-            if self.ticker.in_flight.sent_by_us(self._full_name[topic]):
-                continue
-            if topic == SLAVE_MEASURED:
-                if tracked and now - stamp < 1.5e9 / self._settings.tracker_rate:
-                    self._pending.add(topic)
-            elif stamp == before:
-                self._pending.add(topic)
+        self._barrier.begin(before, now)
         self._looked = 0
         self._clock_out.publish(encode_clock(now))
 
@@ -168,13 +199,13 @@ class SimulationClockNode(EndoscopeNode):
         if waited > self._settings.grace:
             self.ticker.in_flight.give_up()
             self._clock_out.publish(encode_clock(self._now_ns))
-            self._pending.intersection_update(self._settings.wait_for)
+            self._barrier.give_up()
             self._go_on()
-        if self._pending and waited > self._settings.timeout:
+        if self._barrier.pending and waited > self._settings.timeout:
             self._fail()
 
     def _fail(self) -> None:
-        topics = ', '.join(sorted(self._pending))
+        topics = ', '.join(sorted(self._barrier.pending))
         self.failure = BarrierTimeout(
             f'simulated time stands still at {self._now_ns * 1e-9:.3f} s: waited '
             f'{self._settings.timeout:g} s for {topics}; start the node that publishes it, or '
@@ -207,6 +238,7 @@ class SelfStartingClock(SimulationClockNode):
 
     def __init__(self, context: NodeContext) -> None:
         super().__init__(context)
+        self._process = context
         self._begun = False
         self._waiting_since = time.monotonic()
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
