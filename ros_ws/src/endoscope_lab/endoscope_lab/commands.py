@@ -140,7 +140,8 @@ BENCHES: dict[str, Bench] = {
         'With --json, rows are stored as cases finish, and cases in the file are not explained '
         'again, so that a long run can be resumed. With --derive, derives the numbers of '
         'endoscope_explain/criteria.py from the cases, and prints the effect of halving and '
-        'doubling each. Exits 1 if a case cannot be explained, or differs from --against.',
+        'doubling each. With --page, draws which names are confounded with which. Exits 1 if a '
+        'case cannot be explained, or differs from --against.',
         (
             _option('--stratum', 'kinds of cases (default: all)', nargs='+', metavar='NAME'),
             _seeds('seeds of the cases (default: 1-3)'),
@@ -151,6 +152,7 @@ BENCHES: dict[str, Bench] = {
             ),
             _flag('--derive', 'derive the numbers by which explanations are judged'),
             _file('--write', 'Python module to write the derived numbers to'),
+            _file('--page', 'HTML page to write with what is confounded with what'),
         ),
     ),
     'investigate': Bench(

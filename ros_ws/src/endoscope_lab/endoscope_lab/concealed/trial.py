@@ -14,7 +14,7 @@ from endoscope_explain.criteria import INTERVAL_WIDTH
 from endoscope_explain.explain_recording import explain_recording
 from endoscope_explain.explanation import Estimate, Explanation
 from endoscope_lab.bench import keep_row, require_known, side_by_side
-from endoscope_lab.concealed import derivation
+from endoscope_lab.concealed import confusion, derivation
 from endoscope_lab.concealed.judge import (
     Case,
     Correctness,
@@ -52,6 +52,8 @@ def run(args: argparse.Namespace) -> int:
     differ = [(c, each) for c in before for each in differences(before[c], rows[c])]
     for (stratum, seed), each in differ:
         print(f'{stratum} {seed}: {each}')
+    if args.page:
+        args.page.write_text(confusion.page(list(rows.values())), encoding='utf-8')
     if args.derive:
         derivation.derive(list(rows.values()), args.write)
     if before:
