@@ -159,9 +159,10 @@ BENCHES: dict[str, Bench] = {
         'investigate',
         'blind benchmark of `endoscope investigate` on rigs with injected effects',
         'Draws rigs with injected effects, of the kernel and of a simulator that shares no code '
-        'with it, every fourth with two effects. Explains each by the commissioning motion, by the '
-        'loop of `endoscope investigate`, and by one fixed motion as long as all motions of the '
-        'loop. Prints a line for each rig and method, and a table. Seeds 1 to 99 are for '
+        'with it, every fourth with two effects. Explains each by a calibration, by the '
+        'commissioning motion, by the loop of `endoscope investigate`, and by one fixed motion as '
+        'long as all motions of the loop. Prints a line for each rig and method, and a table. '
+        'Seeds 1 to 99 are for '
         'development; of other seeds, first runs are published. With --json, rows are stored as '
         'rigs finish, and rigs in the file are skipped. Exits 1 if a rig cannot be explained.',
         (

@@ -18,6 +18,7 @@ from endoscope_core.errors import EndoscopeError, NotPlayedError, RigStoppedErro
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.plant_file import save_plant
 from endoscope_core.rig import shipped_rig
+from endoscope_core.signals.calibration_motion import calibration_sinusoid
 from endoscope_core.signals.sampled_motion import CommandTable, read_command_file
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.case import ExplainedCase, Inputs, Sources
@@ -48,9 +49,9 @@ from endoscope_lab.concealed.trial import failed, judged_row
 Array = NDArray[np.float64]
 
 TICK = 1e-3
-COMMISSIONED, ASKED, FIXED = 'one motion', 'asked', 'fixed'
-"""What a rig is explained by: the commissioning motion, the loop, and one motion fixed beforehand,
-as long as all motions of the loop together."""
+CALIBRATED, COMMISSIONED, ASKED, FIXED = 'calibration', 'one motion', 'asked', 'fixed'
+"""What a rig is explained by: a calibration's sinusoid, the commissioning motion, the loop, and one
+motion fixed beforehand, as long as all motions of the loop together."""
 UNDER_WAY = 'under way'
 ONE, TWO = 'one effect', 'two effects'
 KINDS = {TWO: 'pairs', ONE: 'catalogue', 'other simulator': 'other_simulator'}
@@ -151,13 +152,18 @@ def asked(
         log = investigate(of, rig.play, explain)
     if rig.last is None:
         raise EndoscopeError(log.words)
+    first = commissioning(case.described, shipped_rig())
+    if time.time() < until:
+        sinusoid = calibration(first.table.joints)
+        recording = SimulatedRig(case, read, until).recorded(sinusoid, CALIBRATED)
+        keep(CALIBRATED, explained([recording], case.described, float(sinusoid.time[-1]))[1])
     experiments = len(log.whole) - 1
     keep(ASKED, rig.last, experiments, str(log.stopped))
     if not experiments:
         keep(FIXED, rig.last)
     elif time.time() < until:
         motion_s = rig.last.motion_s
-        motion = fixed_motion(commissioning(case.described, shipped_rig()), motion_s)
+        motion = fixed_motion(first, motion_s)
         again = SimulatedRig(case, read, until)
         keep(FIXED, explained([again.recorded(motion, FIXED)], case.described, motion_s)[1])
     return list(rows.values())
@@ -273,6 +279,13 @@ def explained(
     return case, _Answer(explanation, motion_s, seconds, cpu_s)
 
 
+def calibration(joints: tuple[str, ...]) -> CommandTable:
+    """The sinusoid of a calibration, on joints by name."""
+    sinusoid = calibration_sinusoid()
+    time = np.arange(0.0, sinusoid.duration + SAMPLE_S, SAMPLE_S)
+    return CommandTable(joints, time, np.column_stack([sinusoid(time)[0]] * len(joints)))
+
+
 def fixed_motion(first: RigMotion, duration: float) -> CommandTable:
     """A motion of some length, fixed beforehand: the first one, then all of the library in turn."""
     # The library is what the loop chooses from, in its order, on one joint after the other.
@@ -300,7 +313,7 @@ def table(rows: Sequence[Asked]) -> str:
     groups['all'] = list(KINDS.values())
     lines = [table_head(*COLUMNS)]
     for name, strata in groups.items():
-        for by in (COMMISSIONED, ASKED, FIXED):
+        for by in (CALIBRATED, COMMISSIONED, ASKED, FIXED):
             of_it = [row for row in rows if row.by == by and row.stratum in strata]
             if of_it:
                 lines.append(table_row(name, by, *_cells(of_it)))

@@ -9,7 +9,14 @@ from endoscope_core.rig import shipped_rig
 from endoscope_core.signals.sampled_motion import CommandTable
 from endoscope_explain.investigation.motions import RigMotion, commissioning, require_allowed
 from endoscope_explain.takes import recordings_joined
-from endoscope_lab.investigate import FIXED, KINDS, SimulatedRig, drawn_rig, fixed_motion
+from endoscope_lab.investigate import (
+    FIXED,
+    KINDS,
+    SimulatedRig,
+    calibration,
+    drawn_rig,
+    fixed_motion,
+)
 
 RIG = shipped_rig()
 
@@ -57,6 +64,14 @@ def joined_command(recording):
     time = recording.command.time
     ticks = np.arange(0.0, time[-1] + 5e-4, 1e-3)
     return recording.command.values[np.searchsorted(time, ticks + 1e-6, side='right') - 1]
+
+
+def test_the_calibration_bends_every_joint_to_both_sides():
+    table = calibration(JOINTS)
+    assert table.time[-1] == pytest.approx(10.0, abs=0.1)
+    assert np.abs(table.angle[[0, -1]]).max() < 1e-9
+    assert table.angle.max(axis=0) == pytest.approx(0.5 * np.pi, rel=1e-3)
+    assert table.angle.min(axis=0) == pytest.approx(-0.5 * np.pi, rel=1e-3)
 
 
 @pytest.mark.parametrize('joints', [('bend_x',), ('bend_x', 'bend_y')])
