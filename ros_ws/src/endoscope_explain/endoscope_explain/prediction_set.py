@@ -51,6 +51,11 @@ class Contest:
         names, gains = tuple(n for n, _ in left), tuple(g for _, g in left)
         return replace(self, names=names, gains=gains)
 
+    @property
+    def statements(self) -> tuple[tuple[str, ...], ...]:
+        """The names, nothing, and something else, in the order of their probabilities' array."""
+        return *self.names, (NOTHING,), (SOMETHING_ELSE,)
+
     def temperature(self, more: float = 1.0) -> float:
         """By how much evidence is divided where it is read, once `more` times as much is there."""
         gains = [[more * gain for gain in self.gains]]
@@ -64,9 +69,8 @@ class Contest:
 
     def posterior(self) -> Posterior:
         """All that was tried, and nothing, and something else, with their probabilities."""
-        every = [*self.names, (NOTHING,), (SOMETHING_ELSE,)]
-        chances = self.probabilities().tolist()
-        return dict(sorted(zip(every, chances, strict=True), key=lambda each: -each[1]))
+        chances = zip(self.statements, self.probabilities().tolist(), strict=True)
+        return dict(sorted(chances, key=lambda each: -each[1]))
 
     def left_open(self, named: str) -> Posterior:
         """The part of it that holds the truth with 90 %, what was named in any case."""

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from endoscope_explain.prediction_set import NOTHING, SOMETHING_ELSE
+from endoscope_explain.prediction_set import NOTHING
 from endoscope_lab.concealed.row import Row
 from endoscope_lab.concealed.sets import JudgedContest
 from endoscope_pages import render_page
@@ -35,8 +35,7 @@ def _of_row(row: Row) -> Iterator[Confusion]:
         if wrong:
             yield Confusion(truth, judged.reported, True)
         left = judged.contest.left_open(judged.reported)
-        every = [*judged.contest.names, (NOTHING,), (SOMETHING_ELSE,)]
-        for names, right in zip(every, judged.right, strict=True):
+        for names, right in judged.statements:
             if names in left and not right and not (wrong and judged.reported in names):
                 yield Confusion(truth, ' or '.join(names), False)
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from endoscope_core.physics.effects import CATALOGUE
 from endoscope_explain.explanation import Explanation
-from endoscope_explain.prediction_set import NOTHING, OTHER_NUMBERS, SOMETHING_ELSE, Contest
+from endoscope_explain.prediction_set import NOTHING, OTHER_NUMBERS, Contest
 from endoscope_lab.concealed.judge import Case, Law, is_of
 
 
@@ -22,26 +22,26 @@ class JudgedContest:
     right: tuple[bool, ...]
 
     @property
+    def statements(self) -> list[tuple[tuple[str, ...], bool]]:
+        """Each statement, and whether it is right."""
+        return list(zip(self.contest.statements, self.right, strict=True))
+
+    @property
     def reported_is_right(self) -> bool:
         """Whether the reported name is right."""
-        every = [*self.contest.names, (NOTHING,), (SOMETHING_ELSE,)]
-        return any(
-            right and self.reported in names for names, right in zip(every, self.right, strict=True)
-        )
+        return any(right and self.reported in names for names, right in self.statements)
 
     @property
     def is_of_function(self) -> bool:
         """Whether an effect was reported, and a function at its place is right."""
         places = _families(self.reported)
-        every = zip(self.contest.names, self.right, strict=False)
-        return any(right and bool(places & set(names)) for names, right in every)
+        return any(right and bool(places & set(names)) for names, right in self.statements)
 
     @property
     def holds(self) -> bool:
         """Whether the prediction set contains the truth."""
         left = self.contest.left_open(self.reported)
-        every = [*self.contest.names, (NOTHING,), (SOMETHING_ELSE,)]
-        return any(right and each in left for each, right in zip(every, self.right, strict=True))
+        return any(right and names in left for names, right in self.statements)
 
     @property
     def size(self) -> int:

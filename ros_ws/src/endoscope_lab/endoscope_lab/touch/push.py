@@ -67,8 +67,8 @@ class Push:
     without: float  # largest force without the guard
     guarded: float  # and with it
     at_end: float  # with it, when the hand has held for 1.5 s
-    # From the limit until the guard yields, s; infinite where it does not, and NaN where it has
-    # nothing to yield to.
+    # From the limit until the guard yields, s; infinite where it does not, negative where it yields
+    # below the limit, minus infinity if that is never reached, and NaN where neither happens.
     late: float
     early: bool  # whether it yields before it touches
     when_yielding: float  # force then; the largest where it does not yield
