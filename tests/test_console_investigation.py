@@ -14,7 +14,7 @@ from endoscope_bags import open_bag
 from endoscope_console.explanations import EXPERIMENT_FILE, REPORT_FILE
 from endoscope_core.physics import PlantDescription, save_plant
 from endoscope_core.signals.sampled_motion import write_command_file
-from endoscope_explain.investigation.log import COMMISSIONING, Round, Stop, begun
+from endoscope_explain.investigation.log import CALIBRATION, Round, Stop, begun
 from endoscope_nodes.names import SLAVE_COMMAND
 
 pytestmark = pytest.mark.engine
@@ -39,13 +39,13 @@ def running(tmp_path_factory):
 
 
 def interrupted(folder, plant):
-    """An investigation that was left once a rig as described had been commissioned."""
+    """An investigation that was left once a rig as described had been calibrated."""
     log = begun(folder, plant)
     folder.mkdir()
     write_short_bag(folder / 'bag_1', PlantDescription(), duration=2.5)
     write_command_file(folder / 'motion_1.csv', np.array([0.0, 4.0]), 0.1 * np.eye(2))
     motion = Round(
-        COMMISSIONING, 'bend_x and bend_y', '', 'motion_1.csv', 4.0, 50.0, 'bag_1', recorded=True
+        CALIBRATION, 'bend_x and bend_y', '', 'motion_1.csv', 4.0, 50.0, 'bag_1', recorded=True
     )
     words = 'It was interrupted.'
     replace(log, rounds=(motion,), stopped=Stop.INTERRUPTED, words=words).write(folder)
@@ -180,7 +180,7 @@ def test_without_consent_nothing_moves_and_who_loses_the_controls_loses_what_is_
     rig = running
     name = begin(rig, page, plant=PLANT_NAME)
     asked = question(rig, page, name)
-    assert asked['words'].startswith('Play this motion: Commissioning of bend_x and ')
+    assert asked['words'].startswith('Play this motion: Calibration of bend_x and ')
     assert asked['why'] == 'Nothing is known of the rig yet but its description.'
     refused = page.order('investigate', experiments=0)
     assert refused['why'] == 'the rig is being investigated'
@@ -238,7 +238,7 @@ def test_one_is_explained_its_plant_shown_by_a_motion_and_adopted_and_undone(run
     assert it['sentences'][-1] == 'Tracking was not measured: the motion was not wanted.'
     assert any(sentence.startswith('Explained in') for sentence in it['sentences'])
     with urllib.request.urlopen(rig.server.address + it['report']) as answer:
-        assert 'Commissioning of bend_x' in answer.read().decode()
+        assert 'Calibration of bend_x' in answer.read().decode()
     played = rig.folder / 'bags' / it['name'] / 'tracking_described_1'
     commands = open_bag(played).joint_state(SLAVE_COMMAND)
     assert abs(commands.select(['bend_x']).require('position')).max() > 0.1

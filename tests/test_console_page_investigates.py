@@ -61,7 +61,7 @@ def test_an_investigation_asks_plays_under_the_hand_and_stops(running, page):
     page.click('#investigate')
     dialog = page.locator('#consent')
     expect(dialog).to_be_visible()
-    shows(page, 'consent-words', re.compile('^Play this motion: Commissioning of bend_x and bend'))
+    shows(page, 'consent-words', re.compile('^Play this motion: Calibration of bend_x and bend'))
     shows(page, 'consent-why', WHY)
     page.keyboard.press('Escape')
     expect(dialog).to_be_hidden()

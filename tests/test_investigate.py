@@ -196,7 +196,7 @@ def test_a_rig_as_described_is_explained_by_one_motion(tmp_path, capfd, monkeypa
     assert only['answer']['improved'] <= only['answer']['described']
     assert (out / 'plant.yaml').exists()
     html = (out / 'index.html').read_text()
-    assert 'Commissioning of bend_x and bend_y' in html
+    assert 'Calibration of bend_x and bend_y' in html
     # The described plant is as good as the improved one.
     described, improved = (each['rmse_deg'] for each in log['tracking'])
     assert [each['by'] for each in log['tracking']] == ['described', 'improved']

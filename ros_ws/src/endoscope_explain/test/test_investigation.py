@@ -27,6 +27,7 @@ from endoscope_explain.investigation.log import LOG_MD, PLANT, Stop, begun
 from endoscope_explain.investigation.motions import (
     MotionRefusedError,
     RigMotion,
+    calibration,
     commissioning,
     require_allowed,
 )
@@ -150,7 +151,7 @@ def test_no_more_motions_are_asked_for_than_are_wanted_and_what_was_named_is_kno
     log = investigate(both, no_rig, explain)
     assert known_then == [{}, {'bend_x': {'stribeck_friction', 'viscous_friction'}}]
     assert log.stopped is Stop.USED_UP
-    assert log.rounds[0].motion == 'commissioning'
+    assert log.rounds[0].motion == 'calibration'
     assert len(log.rounds) == 2
     assert 'viscous_friction' in log.words
     times = (both.folder / LOG_MD).read_text().split('## Times')[1]
@@ -299,13 +300,35 @@ def test_another_plant_or_a_folder_of_something_else_is_refused(both, tmp_path, 
         begun(both.folder, both.plant_file)
 
 
-def test_the_commissioning_motion_keeps_to_the_limits_of_the_rig():
+@pytest.mark.parametrize('first', [calibration, commissioning])
+def test_motions_of_its_own_keep_to_the_limits_of_the_rig(first):
     slow = dataclasses.replace(RIG, joints=dataclasses.replace(RIG.joints, reach=0.6, speed=2.0))
-    motion = commissioning(PlantDescription(), slow)
+    motion = first(PlantDescription(), slow)
     require_allowed(motion, slow)
     assert motion.largest <= 0.6
     with pytest.raises(MotionRefusedError, match='largest angle is'):
-        require_allowed(commissioning(PlantDescription(), RIG), slow)
+        require_allowed(first(PlantDescription(), RIG), slow)
+
+
+def test_the_calibration_bends_every_joint_to_both_sides():
+    motion = calibration(PlantDescription(), RIG)
+    angle = motion.table.angle
+    assert motion.duration == pytest.approx(11.0, abs=0.1)  # with a rest
+    assert np.abs(angle[[0, -1]]).max() < 1e-4
+    assert angle.max(axis=0) == pytest.approx(0.5 * np.pi, rel=1e-3)
+    assert angle.min(axis=0) == pytest.approx(-0.5 * np.pi, rel=1e-3)
+
+
+def test_what_the_calibration_leaves_without_a_name_is_looked_at_in_the_commissioning_motion(
+    both, certain
+):
+    found = {'effects': (), 'verdict': Verdict.UNKNOWN_PHYSICS}
+    explanation = dataclasses.replace(certain.explanation, **found)
+    unnamed = dataclasses.replace(certain, explanation=explanation, **found)
+    log = investigate(both, no_rig, lambda bags, known: unnamed)
+    assert [each.motion for each in log.rounds] == ['calibration', 'commissioning']
+    assert log.stopped is Stop.ONE_CLASS
+    assert 'has no name' in log.words
 
 
 @pytest.mark.parametrize('joint', [0, 1])
@@ -327,8 +350,8 @@ def test_the_commissioning_motion_makes_wide_strokes_again_in_its_second_half(jo
 def test_a_rig_that_the_plant_answers_with_too_much_tension_is_not_moved():
     tension = dataclasses.replace(RIG.tension, calibration_ceiling=5.0)
     weak = dataclasses.replace(RIG, tension=tension)
-    with pytest.raises(MotionRefusedError, match='more than 5 N'):
-        commissioning(PlantDescription(), weak)
+    with pytest.raises(MotionRefusedError, match=r'calibration motion is refused.*more than 5 N'):
+        calibration(PlantDescription(), weak)
 
 
 def test_a_motion_that_is_too_fast_is_refused():

@@ -159,12 +159,12 @@ BENCHES: dict[str, Bench] = {
         'investigate',
         'blind benchmark of `endoscope investigate` on rigs with injected effects',
         'Draws rigs with injected effects, of the kernel and of a simulator that shares no code '
-        'with it, every fourth with two effects. Explains each by a calibration, by the '
-        'commissioning motion, by the loop of `endoscope investigate`, and by one fixed motion as '
-        'long as all motions of the loop. Prints a line for each rig and method, and a table. '
-        'Seeds 1 to 99 are for '
-        'development; of other seeds, first runs are published. With --json, rows are stored as '
-        'rigs finish, and rigs in the file are skipped. Exits 1 if a rig cannot be explained.',
+        'with it, every fourth with two effects. Explains each by the loop of `endoscope '
+        'investigate`, whose first motion is the calibration, and by the commissioning motion '
+        'alone. Prints a line for each explanation, and a table. Seeds 1 to 99 '
+        'are for development; of other seeds, first runs are published. With --json, rows are '
+        'stored as they are there, and rigs in the file are skipped. Exits 1 if a rig cannot be '
+        'explained.',
         (
             _seeds('seeds of the rigs (default: 1-4)', last=4),
             _jobs(),

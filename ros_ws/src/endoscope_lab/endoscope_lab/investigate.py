@@ -18,11 +18,9 @@ from endoscope_core.errors import EndoscopeError, NotPlayedError, RigStoppedErro
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.physics.plant_file import save_plant
 from endoscope_core.rig import shipped_rig
-from endoscope_core.signals.calibration_motion import calibration_sinusoid
 from endoscope_core.signals.sampled_motion import CommandTable, read_command_file
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.case import ExplainedCase, Inputs, Sources
-from endoscope_explain.experiment_motions import SAMPLE_S, as_played, library
 from endoscope_explain.explanation import Explanation
 from endoscope_explain.investigation.investigation import (
     EXPERIMENTS,
@@ -49,18 +47,20 @@ from endoscope_lab.concealed.trial import failed, judged_row
 Array = NDArray[np.float64]
 
 TICK = 1e-3
-CALIBRATED, COMMISSIONED, ASKED, FIXED = 'calibration', 'one motion', 'asked', 'fixed'
-"""What a rig is explained by: a calibration's sinusoid, the commissioning motion, the loop, and one
-motion fixed beforehand, as long as all motions of the loop together."""
+CALIBRATED, ASKED, COMMISSIONED = 'calibration', 'loop', 'one motion'
+"""What a rig is explained by: the loop's first motion, the whole loop, and one motion of 28 s that
+is fixed beforehand."""
 UNDER_WAY = 'under way'
 ONE, TWO = 'one effect', 'two effects'
 KINDS = {TWO: 'pairs', ONE: 'catalogue', 'other simulator': 'other_simulator'}
 """Strata of `endoscope bench concealed` from which rigs are drawn."""
 COLUMNS = (
-    *('rigs', 'explained by', 'number', 'class right', 'names a class', 'named first'),
-    *('exact set', 'false names', 'improved', '80th', 'experiments', 'most', 's of motion'),
+    *('rigs', 'explained by', 'number', 'class right', 'names a class', 'named first', 'alone'),
+    *('false names', 'became wrong', 's to it, median', '90 %', 's of motion', 'most motions'),
     *('cut short', 'CPU s'),
 )
+"""*Alone*: the right name is first and the only one left, *it*; *became wrong*: it was left after
+some motions, and another one was first after more."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,36 +68,37 @@ class Asked(Row):
     """The judged explanation of a rig after some motions."""
 
     by: str
-    experiments: int = 0  # after the commissioning motion
+    experiments: int = 0  # after the calibration
     motion_s: float = math.nan
     stopped: str = ''  # why no further motion was requested
     cpu_s: float = math.nan  # of all work for this row
+
+    @property
+    def alone(self) -> bool:
+        """Whether what was injected is named first, nothing else is, and nothing is left open."""
+        right = self.first_of_identifiable and self.in_set
+        return right and not self.false and self.set_size == 1.0
 
 
 def run(args: argparse.Namespace) -> int:
     """Print a line for each rig and method, then the table; return 1 if a rig failed."""
     before = rows_so_far(args.json, Asked)
-    done = {row.seed for row in before if row.by == FIXED}
+    done = {row.seed for row in before if row.by == COMMISSIONED} & set(args.seeds)
     until = time.time() + 60.0 * args.minutes
     calls = [
         (kind_of(seed), seed, args.rig_minutes, until, args.json)
         for seed in args.seeds
         if seed not in done
     ]
-    found = list(before)
+    # A rig that was broken off is begun again.
+    rows = [row for row in before if row.seed in done]
     for call, future in side_by_side(args.jobs, asked, calls):
         error = future.exception()
-        rows = _failed(*call[:2], error, args.json) if error else future.result()
-        found += rows
-        for row in rows:
-            print(f'{row.by:11s}{row.line()}', flush=True)
-    # Of a rig that was started again, the last row.
-    last = {(row.seed, row.by): row for row in found if row.seed in args.seeds}
-    rows = list(last.values())
+        found = _failed(*call[:2], error, args.json) if error else future.result()
+        rows += found
+        for row in found:
+            print(f'{row.by:12s}{row.experiments:2d} {row.line()}', flush=True)
     print('\n' + table(rows))
-    whole = [row for row in rows if (row.seed, FIXED) in last]
-    if len(whole) < len(rows):
-        print('\nOf these, rigs that were explained by all of them:\n\n' + table(whole))
     print(f'\n{len({row.seed for row in rows})} of {len(args.seeds)} rigs')
     return 1 if any(row.verdict == 'FAILED' for row in rows) else 0
 
@@ -113,18 +114,18 @@ def kind_of(seed: int) -> str:
 def asked(
     stratum: str, seed: int, rig_minutes: float, until: float, file: Path | None
 ) -> list[Asked]:
-    """Explain a rig by one motion, by the loop and by a fixed motion, on one core.
+    """Explain a rig by the loop, after each of its motions, and by one fixed motion, on one core.
 
     Nothing starts after `until`, seconds since the epoch, and the loop plays no further motion
-    after `rig_minutes`. Every row is appended to a file, those of the loop as it runs.
+    after `rig_minutes`. Every row is appended to a file as it is there.
     """
     if time.time() > until:
         return []
     case, read = drawn_rig(stratum, seed)
-    rows: dict[str, Asked] = {}
+    rows: list[Asked] = []
 
     def keep(by: str, answer: _Answer, experiments: int = 0, stopped: str = '') -> None:
-        rows[by] = Asked(
+        row = Asked(
             **vars(judged_row(case, answer.explanation, answer.seconds)),
             by=by,
             experiments=experiments,
@@ -132,17 +133,15 @@ def asked(
             stopped=stopped,
             cpu_s=answer.cpu_s,
         )
-        keep_row(file, rows[by])
+        rows.append(row)
+        keep_row(file, row)
 
     rig = SimulatedRig(case, read, min(until, time.time() + 60.0 * rig_minutes))
 
     def explain(bags: Sequence[Path], known: Known) -> ExplainedCase:
         found = rig.explain(bags, known)
         assert rig.last is not None
-        if len(bags) == 1:
-            keep(COMMISSIONED, rig.last)
-        else:
-            keep(ASKED, rig.last, len(bags) - 1, UNDER_WAY)
+        keep(ASKED if len(bags) > 1 else CALIBRATED, rig.last, len(bags) - 1, UNDER_WAY)
         return found
 
     with tempfile.TemporaryDirectory() as scratch, threadpool_limits(1):
@@ -152,21 +151,12 @@ def asked(
         log = investigate(of, rig.play, explain)
     if rig.last is None:
         raise EndoscopeError(log.words)
-    first = commissioning(case.described, shipped_rig())
+    keep(ASKED, rig.last, len(log.whole) - 1, str(log.stopped))
     if time.time() < until:
-        sinusoid = calibration(first.table.joints)
-        recording = SimulatedRig(case, read, until).recorded(sinusoid, CALIBRATED)
-        keep(CALIBRATED, explained([recording], case.described, float(sinusoid.time[-1]))[1])
-    experiments = len(log.whole) - 1
-    keep(ASKED, rig.last, experiments, str(log.stopped))
-    if not experiments:
-        keep(FIXED, rig.last)
-    elif time.time() < until:
-        motion_s = rig.last.motion_s
-        motion = fixed_motion(first, motion_s)
-        again = SimulatedRig(case, read, until)
-        keep(FIXED, explained([again.recorded(motion, FIXED)], case.described, motion_s)[1])
-    return list(rows.values())
+        fixed = commissioning(case.described, shipped_rig())
+        recording = SimulatedRig(case, read, until).recorded(fixed.table, COMMISSIONED)
+        keep(COMMISSIONED, explained([recording], case.described, fixed.duration)[1])
+    return rows
 
 
 def drawn_rig(stratum: str, seed: int) -> tuple[Case, Callable[[Array], Readings]]:
@@ -279,48 +269,32 @@ def explained(
     return case, _Answer(explanation, motion_s, seconds, cpu_s)
 
 
-def calibration(joints: tuple[str, ...]) -> CommandTable:
-    """The sinusoid of a calibration, on joints by name."""
-    sinusoid = calibration_sinusoid()
-    time = np.arange(0.0, sinusoid.duration + SAMPLE_S, SAMPLE_S)
-    return CommandTable(joints, time, np.column_stack([sinusoid(time)[0]] * len(joints)))
-
-
-def fixed_motion(first: RigMotion, duration: float) -> CommandTable:
-    """A motion of some length, fixed beforehand: the first one, then all of the library in turn."""
-    # The library is what the loop chooses from, in its order, on one joint after the other.
-    joints, names = first.joint.split(' and '), first.table.joints
-    reaches = tuple((joint, first.largest) for joint in joints)
-    by_joint = [library(joint, reaches, shipped_rig()) for joint in joints]
-    angles = [each.angle for motions in zip(*by_joint, strict=True) for each in motions]
-    rest = np.zeros((sum(map(len, angles)), len(names)))
-    rest[:, [names.index(joint) for joint in joints]] = np.concatenate(angles)
-    count = math.ceil((duration - first.duration) / SAMPLE_S)
-    rest = np.tile(rest, (math.ceil(count / len(rest)), 1))[:count]
-    time, angle = as_played(
-        np.asarray(SAMPLE_S * np.arange(len(rest)), np.float64), rest, shipped_rig()
-    )
-    return CommandTable(
-        names,
-        np.concatenate([first.table.time, first.duration + SAMPLE_S + time]),
-        np.concatenate([first.table.angle, angle]),
-    )
-
-
 def table(rows: Sequence[Asked]) -> str:
     """A line for each kind of rig and method, and one for each method over all rigs."""
     groups = {name: [stratum] for name, stratum in KINDS.items()}
     groups['all'] = list(KINDS.values())
     lines = [table_head(*COLUMNS)]
     for name, strata in groups.items():
-        for by in (CALIBRATED, COMMISSIONED, ASKED, FIXED):
-            of_it = [row for row in rows if row.by == by and row.stratum in strata]
-            if of_it:
-                lines.append(table_row(name, by, *_cells(of_it)))
+        for by in (CALIBRATED, ASKED, COMMISSIONED):
+            stages = _by_rig(rows, by, strata)
+            if stages:
+                lines.append(table_row(name, by, *_cells(stages)))
     return '\n'.join(lines)
 
 
-def _cells(rows: Sequence[Asked]) -> tuple[str, ...]:
+def _by_rig(rows: Sequence[Asked], by: str, strata: Sequence[str]) -> list[list[Asked]]:
+    """Rows by one way of each rig that was explained by it, in turn; of the loop, all of it."""
+    kept = (by, CALIBRATED) if by == ASKED else (by,)
+    found: dict[int, list[Asked]] = {}
+    for row in rows:
+        if row.stratum in strata and row.by in kept:
+            found.setdefault(row.seed, []).append(row)
+    return [of_it for of_it in found.values() if of_it[-1].by == by]
+
+
+def _cells(rigs: Sequence[Sequence[Asked]]) -> tuple[str, ...]:
+    rows = [stages[-1] for stages in rigs]
+
     def share(name: str) -> str:
         return f'{100.0 * np.mean([getattr(row, name) for row in rows]):.0f} %'
 
@@ -328,29 +302,39 @@ def _cells(rows: Sequence[Asked]) -> tuple[str, ...]:
         known = [value for row in rows if not math.isnan(value := getattr(row, name))]
         return f'{np.mean(known):.{decimals}f}' if known else '-'
 
-    # A failed explanation predicts nothing.
-    left = np.nan_to_num([row.augmented for row in rows], nan=np.inf)
-    cut = sum(row.stopped in (Stop.INTERRUPTED, Stop.FAULT, UNDER_WAY) for row in rows)
+    wrong = sum(
+        any(r.alone for r in stages) and not stages[-1].first_of_identifiable for stages in rigs
+    )
+    seconds = [_seconds(stages) for stages in rigs]
+    middle, most = (np.quantile(seconds, p, method='higher') for p in (0.5, 0.9))
+    cut = sum(row.stopped in (Stop.INTERRUPTED, Stop.FAULT) for row in rows)
     return (
         str(len(rows)),
         share('in_set'),
         mean('set_size', 1),
-        share('first'),
-        share('exact'),
+        share('first_of_identifiable'),
+        share('alone'),
         str(sum(row.false for row in rows)),
-        f'{np.median(left):.3g}',
-        f'{np.quantile(left, 0.8, method="higher"):.3g}',
-        mean('experiments', 1),
-        str(max(row.experiments for row in rows)),
+        str(wrong),
+        *('never' if math.isinf(s) else f'{s:.0f}' for s in (middle, most)),
         mean('motion_s', 0),
+        str(max(row.experiments for row in rows) + 1),
         str(cut),
         mean('cpu_s', 0),
     )
 
 
+def _seconds(stages: Sequence[Asked]) -> float:
+    """Motion in s after which the right name is left, and stays; infinite where it never is."""
+    since = math.inf
+    for row in stages:
+        since = min(since, row.motion_s) if row.alone else math.inf
+    return since
+
+
 def _failed(stratum: str, seed: int, error: BaseException, file: Path | None) -> list[Asked]:
     row = vars(failed(stratum, seed, error))
-    rows = [Asked(**row, by=by) for by in (COMMISSIONED, ASKED, FIXED)]
+    rows = [Asked(**row, by=by) for by in (CALIBRATED, ASKED, COMMISSIONED)]
     for each in rows:
         keep_row(file, each)
     return rows

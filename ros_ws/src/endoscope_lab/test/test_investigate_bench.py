@@ -1,21 +1,23 @@
-"""Rigs with injected effects under investigation: motions that are played."""
+"""Rigs with injected effects under investigation: motions that are played, and their table."""
 
 import numpy as np
 import pytest
 
 from endoscope_core.names import JOINTS
-from endoscope_core.physics import PlantDescription
 from endoscope_core.rig import shipped_rig
 from endoscope_core.signals.sampled_motion import CommandTable
-from endoscope_explain.investigation.motions import RigMotion, commissioning, require_allowed
 from endoscope_explain.takes import recordings_joined
+from endoscope_lab.concealed.trial import failed
 from endoscope_lab.investigate import (
-    FIXED,
+    ASKED,
+    CALIBRATED,
+    COLUMNS,
+    COMMISSIONED,
     KINDS,
+    Asked,
     SimulatedRig,
-    calibration,
     drawn_rig,
-    fixed_motion,
+    table,
 )
 
 RIG = shipped_rig()
@@ -66,21 +68,31 @@ def joined_command(recording):
     return recording.command.values[np.searchsorted(time, ticks + 1e-6, side='right') - 1]
 
 
-def test_the_calibration_bends_every_joint_to_both_sides():
-    table = calibration(JOINTS)
-    assert table.time[-1] == pytest.approx(10.0, abs=0.1)
-    assert np.abs(table.angle[[0, -1]]).max() < 1e-9
-    assert table.angle.max(axis=0) == pytest.approx(0.5 * np.pi, rel=1e-3)
-    assert table.angle.min(axis=0) == pytest.approx(-0.5 * np.pi, rel=1e-3)
+def explained_by(by, seed, experiments, motion_s, right, size=1.0):
+    row = vars(failed('catalogue', seed, ValueError('made up')))
+    judged = {'first_of_identifiable': right, 'in_set': right, 'set_size': size, 'false': 0}
+    return Asked(**{**row, **judged}, by=by, experiments=experiments, motion_s=motion_s)
 
 
-@pytest.mark.parametrize('joints', [('bend_x',), ('bend_x', 'bend_y')])
-def test_the_fixed_motion_is_allowed_and_begins_as_the_requested_one(joints):
-    plant = PlantDescription().of_joints(joints)
-    first = commissioning(plant, RIG)
-    longer = fixed_motion(first, 3.0 * first.duration)
-    assert longer.time[-1] == pytest.approx(3.0 * first.duration, abs=1.5)
-    np.testing.assert_array_equal(longer.angle[: len(first.table.time)], first.table.angle)
-    require_allowed(RigMotion(FIXED, '', '', longer), RIG)
-    moved = np.abs(longer.angle[len(first.table.time) :]).max(axis=0) > 0.1
-    assert moved.tolist() == [joint in joints for joint in longer.joints]
+def test_the_table_counts_the_motion_until_the_right_name_is_left_and_stays():
+    rows = [
+        explained_by(CALIBRATED, 1, 0, 10.0, True),
+        explained_by(ASKED, 1, 0, 10.0, True),
+        explained_by(CALIBRATED, 2, 0, 10.0, True, 2.0),
+        explained_by(ASKED, 2, 1, 15.0, True),
+        explained_by(ASKED, 2, 2, 21.0, True),
+        # Left alone and then lost: wrong by asking.
+        explained_by(CALIBRATED, 3, 0, 10.0, True),
+        explained_by(ASKED, 3, 1, 16.0, False),
+        explained_by(COMMISSIONED, 3, 0, 28.8, False),
+    ]
+    lines = [line.split('|')[1:-1] for line in table(rows).splitlines()[2:]]
+    cells = {row[1]: row for line in lines if (row := [cell.strip() for cell in line])[0] == 'all'}
+    shown = ('number', 'alone', 'became wrong', 's to it, median', '90 %', 'most motions')
+
+    def of(by):
+        return [cells[by][COLUMNS.index(name)] for name in shown]
+
+    assert of(CALIBRATED) == ['3', '67 %', '0', '10', 'never', '1']
+    assert of(ASKED) == ['3', '67 %', '1', '15', 'never', '3']
+    assert of(COMMISSIONED) == ['1', '0 %', '0', 'never', 'never', '1']

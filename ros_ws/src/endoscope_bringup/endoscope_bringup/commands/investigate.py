@@ -26,14 +26,14 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
     parser = subparsers.add_parser(
         'investigate',
         help='move a rig, explain it, and play motions that discriminate between the alternatives',
-        description='Plays the commissioning motion on a running graph and explains the recording '
+        description='Plays the calibration sinusoid on a running graph and explains the recording '
         'with the plant P.yaml. As long as an effect has alternatives, or a wide interval of its '
         'strength, plays the safe motion that discriminates best, and explains all recordings '
-        'together. Writes bags, log.json, log.md, index.html and the improved plant, plant.yaml, '
-        'to DIR meanwhile. The same command on the same DIR continues an interrupted '
-        'investigation. Each motion needs consent, has its own motion session, and is refused '
-        'beyond the limits of rig.yaml. Ctrl-C pauses the graph. Exits 0 at the end, 1 if the rig '
-        'or a person stopped it, 130 when interrupted.',
+        'together; where no short one does, the commissioning motion. Writes bags, log.json, '
+        'log.md, index.html and the improved plant, plant.yaml, to DIR meanwhile. The same command '
+        'on the same DIR continues an interrupted investigation. Each motion needs consent, has '
+        'its own motion session, and is refused beyond the limits of rig.yaml. Ctrl-C pauses the '
+        'graph. Exits 0 at the end, 1 if the rig or a person stopped it, 130 when interrupted.',
     )
     parser.add_argument(
         '--plant', type=Path, required=True, metavar='P.yaml', help='plant of the rig'
@@ -50,7 +50,7 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         type=within(0, 100, int),
         default=4,
         metavar='N',
-        help='largest number of motions after the commissioning motion (default 4)',
+        help='largest number of motions after the calibration (default 4)',
     )
     parser.add_argument(
         '--attended',

@@ -18,10 +18,11 @@ from endoscope_explain.case import ExplainedCase, Sources
 from endoscope_explain.design import is_wide, propose, what_is_asked
 from endoscope_explain.explanation import NamedEffect, Verdict
 from endoscope_explain.investigation import log as logs
-from endoscope_explain.investigation.log import Log, Name, RigAnswer, Round, Stop
+from endoscope_explain.investigation.log import COMMISSIONING, Log, Name, RigAnswer, Round, Stop
 from endoscope_explain.investigation.motions import (
     PlayThrough,
     RigMotion,
+    calibration,
     commissioning,
     held_out,
     of_experiment,
@@ -55,7 +56,7 @@ class Investigation:
     folder: Path  # of everything that is written
     plant_file: Path  # the described plant
     rig: Rig
-    experiments: int = EXPERIMENTS  # at most, after the commissioning motion
+    experiments: int = EXPERIMENTS  # at most, after the calibration
     jobs: int = 2
 
     @property
@@ -94,7 +95,7 @@ def investigate(
         investigation, logs.begun(investigation.folder, investigation.plant_file), page, report
     )
     try:
-        first = commissioning(investigation.plant, investigation.rig)
+        first = calibration(investigation.plant, investigation.rig)
         investigation.folder.mkdir(parents=True, exist_ok=True)
         running.keep(running.log)
         motion = running.answered(explain) if running.log.whole else first
@@ -166,19 +167,27 @@ class _Running:
         self.keep(self.log.with_whole(answer=found))
         for line in logs.answered(found):
             self.report(line)
-        if not (open_questions(case) or any(map(is_wide, case.effects))):
+        played = {(each.motion, each.joint) for each in whole}
+        commissioned = any(motion == COMMISSIONING for motion, _ in played)
+        unnamed = case.verdict == Verdict.UNKNOWN_PHYSICS and not commissioned
+        undecided = unnamed or bool(open_questions(case))
+        if not (undecided or any(map(is_wide, case.effects))):
             return Stop.ONE_CLASS
         if len(whole) > self.of.experiments:
             return Stop.USED_UP
         self.report('looking for the motion that decides more')
         began = time.monotonic()
-        played = {(each.motion, each.joint) for each in whole}
         asked = what_is_asked(case)
         proposed = propose(case, asked, self.of.jobs, played)
-        if proposed is None:
+        motion: RigMotion | Stop = Stop.NOTHING_TO_GAIN
+        if proposed is not None:
+            motion = of_experiment(proposed)
+        elif undecided and not commissioned:
+            motion = commissioning(self.of.plant, self.of.rig)
+        else:
             self.would_decide = what_would_decide(asked, self.of.jobs)
         self.keep(self.log.with_whole(proposed_s=time.monotonic() - began))
-        return Stop.NOTHING_TO_GAIN if proposed is None else of_experiment(proposed)
+        return motion
 
     def follow(self, track: PlayThrough) -> None:
         """See how the tip follows by the described and by the improved plant."""

@@ -15,7 +15,7 @@ from endoscope_core.physics.hooks import LINKS, TRACKER
 from endoscope_core.schema import read
 
 LOG_MD, PLANT = 'log.md', 'plant.yaml'
-COMMISSIONING = 'commissioning'
+CALIBRATION, COMMISSIONING = 'calibration', 'commissioning'
 SCHEMA = 1
 
 

@@ -1,7 +1,7 @@
 """The motions of an investigation, within what a rig may do, and how well the tip follows one."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from endoscope_core.names import JOINTS
 from endoscope_core.physics.description import PlantDescription
 from endoscope_core.rig import Rig
 from endoscope_core.signals import Signal, hold, move, non_periodic_signal, sequence
+from endoscope_core.signals.calibration_motion import calibration_sinusoid
 from endoscope_core.signals.motions import again_with_hold, chirp, steps_with_holds, there_and_back
 from endoscope_core.signals.sampled_motion import (
     CommandTable,
@@ -23,11 +24,17 @@ from endoscope_core.signals.sampled_motion import (
 from endoscope_explain.case import NextExperiment
 from endoscope_explain.experiment_motions import SAMPLE_S, answer_to, as_played, is_safe
 from endoscope_explain.investigation import log as logs
-from endoscope_explain.investigation.log import COMMISSIONING, Log, Tracking, in_words
+from endoscope_explain.investigation.log import (
+    CALIBRATION,
+    COMMISSIONING,
+    Log,
+    Tracking,
+    in_words,
+)
 from endoscope_explain.recording import BENDING, DESIRED, Array
 
 SHARES = (1.0, 0.75, 0.5, 0.3)
-"""Of the commissioning motion's size, the first that is safe."""
+"""Of a motion's size, the first that is safe."""
 ALONE_S = 3.0
 """For which `bend_x` moves alone at first: to both ends."""
 TOLERANCE = 1.01
@@ -63,14 +70,25 @@ class RigMotion:
         return in_words(self.waveform, self.joint, self.duration, math.degrees(self.largest))
 
 
-def first_motion() -> dict[str, Signal]:
+def calibration(plant: PlantDescription, rig: Rig) -> RigMotion:
+    """The sinusoid that every session plays, on all joints, as large as is allowed; see `_safe`."""
+    sinusoid = calibration_sinusoid()
+    why = 'Nothing is known of the rig yet but its description.'
+    return _safe(CALIBRATION, dict.fromkeys(JOINTS, sinusoid), why, plant, rig)
+
+
+def commissioning(plant: PlantDescription, rig: Rig) -> RigMotion:
+    """The commissioning motion as large as is allowed; see `_safe`."""
+    why = 'No shorter motion decides what is left open, and this one makes all that a rig can make.'
+    return _safe(COMMISSIONING, all_that_a_rig_makes(), why, plant, rig)
+
+
+def all_that_a_rig_makes() -> dict[str, Signal]:
     """Wide strokes, a chirp, the strokes again with hold and small loop, and steps, by joint."""
-    # 28 s and a rest of 1 s, about half as long as `signals.commissioning_motion`, as what it
-    # leaves open is asked for by the next one. Its strokes of 140 deg are 40 deg wider than the
-    # backlash of the worst class, and come again in its second half, which is what is held out.
-    # `bend_y` begins once `bend_x` has moved alone, so that whatever appears on it meanwhile is
-    # coupling.
-    # Rounded corners take 2 deg.
+    # 28 s and a rest of 1 s, about half as long as `signals.commissioning_motion`. Its strokes of
+    # 140 deg are 40 deg wider than the backlash of the worst class, and come again in its second
+    # half, which is what is held out. `bend_y` begins once `bend_x` has moved alone, so that
+    # whatever appears on it meanwhile is coupling. Rounded corners take 2 deg.
     reach = math.radians(72.0)
     speed = 1.1 * reach
     once, again = there_and_back(reach, speed), again_with_hold(reach, speed)
@@ -82,10 +100,11 @@ def first_motion() -> dict[str, Signal]:
     return {'bend_x': sequence(COMMISSIONING, x), 'bend_y': sequence(COMMISSIONING, y)}
 
 
-def commissioning(plant: PlantDescription, rig: Rig) -> RigMotion:
-    """The commissioning motion as large as is allowed; MotionRefusedError if it is at no size."""
-    motion = first_motion()
-    time = np.arange(0.0, max(signal.duration for signal in motion.values()), SAMPLE_S)
+def _safe(
+    name: str, motion: Mapping[str, Signal], why: str, plant: PlantDescription, rig: Rig
+) -> RigMotion:
+    """The motion by joint as large as is allowed; MotionRefusedError if it is at no size."""
+    time = np.arange(0.0, max(signal.duration for signal in motion.values()) + SAMPLE_S, SAMPLE_S)
     whole = np.stack(
         [
             motion[joint](time)[0] if joint in plant.joints else np.zeros_like(time)
@@ -99,13 +118,11 @@ def commissioning(plant: PlantDescription, rig: Rig) -> RigMotion:
     columns = [JOINTS.index(joint) for joint in here]
     for share in SHARES:
         ticks, angle = as_played(time, share * whole, rig)
-        answer = answer_to(plant.of_joints(here), COMMISSIONING, ticks, angle[:, columns], rig)
+        answer = answer_to(plant.of_joints(here), name, ticks, angle[:, columns], rig)
         if is_safe(answer, ceiling, math.inf):
-            why = 'Nothing is known of the rig yet but its description.'
-            table = CommandTable(JOINTS, ticks, angle)
-            return RigMotion(COMMISSIONING, ' and '.join(here), why, table)
+            return RigMotion(name, ' and '.join(here), why, CommandTable(JOINTS, ticks, angle))
     raise MotionRefusedError(
-        f'the commissioning motion is refused: the described plant answers {SHARES[-1]:.0%} of it '
+        f'the {name} motion is refused: the described plant answers {SHARES[-1]:.0%} of it '
         f'with more than {ceiling:g} N, tension.calibration_ceiling of rig.yaml'
     )
 
@@ -141,9 +158,9 @@ DURATION_S = 15.0
 LEAD_S = 4.0
 """Before errors count, the tip goes as far to either side as it will, so that play and friction are
 where the same way has led them, whatever was before and whichever plant is inverted."""
-TRACKED_SHARE = 0.5
-"""Of the largest angle of the commissioning motion: what compensation adds to it stays within what
-the rig has been through."""
+TRACKED_SHARE = 0.4
+"""Of the largest angle of the calibration: what compensation adds to it, up to 50 deg, stays within
+what the rig has been through."""
 
 PlayThrough = Callable[[RigMotion, Path, Path, Path], None]
 """Plays a motion, which a file holds, to a bag, through the inverse of the plant of another."""
@@ -165,7 +182,7 @@ class Tracked:
 
 def held_out(plant: PlantDescription, rig: Rig) -> RigMotion:
     """A motion of both joints that is among no experiments."""
-    first = commissioning(plant, rig)
+    first = calibration(plant, rig)
     signal = non_periodic_signal(DURATION_S)
     time = np.arange(0.0, LEAD_S + signal.duration, SAMPLE_S)
     lead = time < LEAD_S
