@@ -94,11 +94,14 @@ def open_questions(case: ExplainedCase) -> list[OpenQuestion]:
 
 
 def _chances(contest: Contest, named: str) -> dict[str, float]:
-    """The set that is left open, each statement by the first of its names that can be simulated."""
+    """The set that is left open, by all names of each statement that can be simulated."""
+    # What is one statement in these recordings need not be one in another motion: its names share
+    # its probability.
     chances: dict[str, float] = {}
     for names, p in contest.left_open(named).items():
-        name = named if named in names else next((n for n in names if n in KNOWN), names[0])
-        chances[name] = chances.get(name, 0.0) + max(p, _LEAST)
+        laws = [n for n in names if n == named or n in KNOWN or n == OTHER_NUMBERS] or names[:1]
+        for name in laws:
+            chances[name] = chances.get(name, 0.0) + max(p / len(laws), _LEAST)
     return dict(sorted(chances.items(), key=lambda each: each[0] != named))
 
 

@@ -227,6 +227,16 @@ def test_other_numbers_are_a_law_and_a_function_is_something_else(late):
     assert propose(case, what_is_asked(case)).separates[:2] == (OTHER_NUMBERS, 'transport_delay')
 
 
+def test_names_that_are_one_statement_in_the_recordings_are_told_apart_where_a_motion_can(late):
+    alone = ('transport_delay', 'actuator_lag', 'load_of_angle')
+    case = case_of(late, LATE, 'transport_delay', names=(alone,), gains=(4000.0,))
+    (question,) = open_questions(case)
+    half = question.chances['transport_delay']
+    # A function at the place of a name that can be simulated is the same question.
+    assert question.chances == {'transport_delay': half, 'actuator_lag': half}
+    assert propose(case, what_is_asked(case)).separates == ('transport_delay', 'actuator_lag')
+
+
 def test_for_a_law_of_no_name_a_motion_is_asked_for_that_was_never_made(late_case):
     (question,) = open_questions(late_case)
     unnamed = {'transport_delay': 0.5, 'load_of_angle': 0.5}
