@@ -1,7 +1,7 @@
 """One recording, audited and explained: what every output is made from."""
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from endoscope_explain.explanation import (
 from endoscope_explain.fit.free_parameters import nominal_number
 from endoscope_explain.options import Options
 from endoscope_explain.recording import RigRecording
+from endoscope_explain.search.term import Known
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,8 @@ class Sources(Options):
     bag: Path  # the recording to explain
     plant: PlantDescription  # the simulation that an engineer has
     given: GivenJoints | None = None  # the physics of each joint, if it is not to be searched
-    # By joint, names that other recordings of the rig gave or left open.
-    known: Mapping[str, Collection[str]] = field(default_factory=dict)
+    # By joint, what other recordings of the rig gave or left open.
+    known: Mapping[str, Known] = field(default_factory=dict)
     plant_file: Path | None = None  # where the plant was read from
     command: str = ''  # as it was typed
 

@@ -1,6 +1,6 @@
 """From a cleaned recording and a plant description to named effects."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -42,7 +42,7 @@ from endoscope_explain.search.levels import JointSearch, Level, search
 from endoscope_explain.search.null_rigs import NEAR
 from endoscope_explain.search.refit import Candidate
 from endoscope_explain.search.screen import background, directions, gains
-from endoscope_explain.search.term import Term
+from endoscope_explain.search.term import Known, Term
 
 Progress = Callable[[str], None]
 
@@ -64,12 +64,12 @@ def explain_recording(
     most_effects: int = MOST_EFFECTS,
     given: GivenJoints | None = None,
     left_out: tuple[str, ...] = (),
-    known: Mapping[str, Collection[str]] | None = None,
+    known: Mapping[str, Known] | None = None,
     jobs: int = 2,
     progress: Progress | None = None,
 ) -> Explanation:
     """Explain why a recording differs from the simulation of a plant."""
-    # What is `known` of a joint, names from other recordings of the rig, is fitted in any case.
+    # What is `known` of a joint from other recordings of the rig is fitted in any case.
     report = progress or (lambda _: None)
     observations = tuple(o for o in with_held_noise(observe(recording, plant)) if o.channels)
     if not _is_enough(observations):
@@ -86,7 +86,7 @@ def explain_recording(
         joint = pair[0].model.observation.joint
         if given is not None:
             return explained_by(pair, given[joint], jobs)
-        tried = search([pair], jobs, most_effects, left_out, (known or {}).get(joint, ()))
+        tried = search([pair], jobs, most_effects, left_out, (known or {}).get(joint))
         return tried, decide(tried, jobs)
 
     def stands(tried: JointSearch, angle: Array) -> bool:

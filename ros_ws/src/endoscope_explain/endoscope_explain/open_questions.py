@@ -99,7 +99,7 @@ def _chances(contest: Contest, named: str) -> dict[str, float]:
     # its probability.
     chances: dict[str, float] = {}
     for names, p in contest.left_open(named).items():
-        laws = [n for n in names if n == named or n in KNOWN or n == OTHER_NUMBERS] or names[:1]
+        laws = [n for n in names if n in (named, OTHER_NUMBERS) or n in KNOWN] or names[:1]
         for name in laws:
             chances[name] = chances.get(name, 0.0) + max(p / len(laws), _LEAST)
     return dict(sorted(chances.items(), key=lambda each: each[0] != named))

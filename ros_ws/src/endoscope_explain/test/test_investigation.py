@@ -139,7 +139,7 @@ def certain(stribeck_case):
     return dataclasses.replace(stribeck_case, effects=(alone,))
 
 
-def test_no_more_motions_are_asked_for_than_are_wanted_and_what_was_named_is_known_to_the_next(
+def test_no_more_motions_are_asked_for_than_are_wanted_and_names_and_numbers_are_known_to_the_next(
     both, stribeck_case
 ):
     known_then = []
@@ -149,7 +149,9 @@ def test_no_more_motions_are_asked_for_than_are_wanted_and_what_was_named_is_kno
         return stribeck_case
 
     log = investigate(both, no_rig, explain)
-    assert known_then == [{}, {'bend_x': {'stribeck_friction', 'viscous_friction'}}]
+    (effect,) = stribeck_case.plant.effects
+    numbers = {'stribeck_friction': effect.parameters, 'viscous_friction': {}}
+    assert known_then == [{}, {'bend_x': numbers}]
     assert log.stopped is Stop.USED_UP
     assert log.rounds[0].motion == 'calibration'
     assert len(log.rounds) == 2

@@ -25,7 +25,7 @@ from endoscope_explain.explanation import Explanation
 from endoscope_explain.investigation.investigation import (
     EXPERIMENTS,
     Investigation,
-    Known,
+    KnownOfRig,
     investigate,
 )
 from endoscope_explain.investigation.log import Stop
@@ -138,7 +138,7 @@ def asked(
 
     rig = SimulatedRig(case, read, min(until, time.time() + 60.0 * rig_minutes))
 
-    def explain(bags: Sequence[Path], known: Known) -> ExplainedCase:
+    def explain(bags: Sequence[Path], known: KnownOfRig) -> ExplainedCase:
         found = rig.explain(bags, known)
         assert rig.last is not None
         keep(ASKED if len(bags) > 1 else CALIBRATED, rig.last, len(bags) - 1, UNDER_WAY)
@@ -203,7 +203,7 @@ class SimulatedRig:
         self._recordings[bag] = recording
         self._motion_s += motion.duration
 
-    def explain(self, bags: Sequence[Path], known: Known) -> ExplainedCase:
+    def explain(self, bags: Sequence[Path], known: KnownOfRig) -> ExplainedCase:
         """Explain recordings together, as `explain_together` does bags."""
         recordings = [self._recordings[bag] for bag in bags]
         case, answer = explained(recordings, self._case.described, self._motion_s, known)
@@ -250,7 +250,7 @@ def explained(
     recordings: Sequence[RigRecording],
     plant: PlantDescription,
     motion_s: float,
-    known: Known = MappingProxyType({}),
+    known: KnownOfRig = MappingProxyType({}),
 ) -> tuple[ExplainedCase, _Answer]:
     """Explain recordings of one rig together, on one core."""
     inputs = [

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -36,15 +36,16 @@ from endoscope_explain.prediction_set import OTHER_NUMBERS
 from endoscope_explain.report.left_open import in_words
 from endoscope_explain.report.numbers import shown
 from endoscope_explain.report.sentences import verdict_sentence, where
+from endoscope_explain.search.term import Known
 from endoscope_explain.takes import inputs_joined
 
 EXPERIMENTS = 4
 
 Play = Callable[[RigMotion, Path, Path], None]
 """Plays a motion, which a file holds, and records it to a bag."""
-Known = Mapping[str, Collection[str]]
-"""By joint, names that were given or left open before."""
-Explain = Callable[[Sequence[Path], Known], ExplainedCase]
+KnownOfRig = Mapping[str, Known]
+"""By joint, what was given or left open before."""
+Explain = Callable[[Sequence[Path], KnownOfRig], ExplainedCase]
 """Explains recordings of one rig together, with what is known from some of them."""
 Page = Callable[[Log], str]
 
@@ -67,7 +68,7 @@ class Investigation:
 
 def explain_together(
     bags: Sequence[Path],
-    known: Known,
+    known: KnownOfRig,
     investigation: Investigation,
     progress: Progress | None = None,
 ) -> ExplainedCase:
@@ -161,7 +162,7 @@ class _Running:
         """Explain all recordings together, and work out what to ask next, or why nothing."""
         began = time.monotonic()
         whole = self.log.whole
-        case = explain([self.of.folder / each.bag for each in whole], self.log.known())
+        case = explain([self.of.folder / each.bag for each in whole], self.known())
         save_plant(case.plant, self.of.folder / logs.PLANT)
         found = answer_of(case, time.monotonic() - began)
         self.keep(self.log.with_whole(answer=found))
@@ -188,6 +189,16 @@ class _Running:
             self.would_decide = what_would_decide(asked, self.of.jobs)
         self.keep(self.log.with_whole(proposed_s=time.monotonic() - began))
         return motion
+
+    def known(self) -> KnownOfRig:
+        """What was given or left open so far, and the numbers of what was given last."""
+        found: dict[str, dict[str, Mapping[str, float]]] = {
+            joint: {key: {} for key in sorted(names)} for joint, names in self.log.known().items()
+        }
+        if found:
+            for spec in load_plant(self.of.folder / logs.PLANT).effects:
+                found.setdefault(spec.joint, {})[spec.id] = spec.parameters
+        return found
 
     def follow(self, track: PlayThrough) -> None:
         """See how the tip follows by the described and by the improved plant."""

@@ -1,8 +1,8 @@
 """Candidates with one term more: screened, tried by few simulations, fitted until they stand."""
 
 import math
-from collections.abc import Callable, Collection, Hashable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import chain
 
 import numpy as np
@@ -34,7 +34,7 @@ from endoscope_explain.search.screen import (
     directions,
     screened,
 )
-from endoscope_explain.search.term import Term, Variant, effects, functions
+from endoscope_explain.search.term import Known, Term, Variant, begun_as_before, effects, functions
 
 TRIED, REFITTED = 10, 4
 """Terms that get a first fit and a full one: in the study the truth was among the first three of
@@ -70,16 +70,14 @@ class Screened:
     parent: Parent
     behind: tuple[Background, ...]
     ways: tuple[tuple[Directions, ...], ...]
-    known: Collection[str] = ()  # terms that were named, or left open, by other recordings
+    known: Known = field(default_factory=dict)
     left_out: tuple[str, ...] = ()  # effects that are not searched for
 
 
-def screen_terms(
-    parent: Parent, jobs: int, left_out: tuple[str, ...], known: Collection[str] = ()
-) -> Screened:
+def screen_terms(parent: Parent, jobs: int, left_out: tuple[str, ...], known: Known) -> Screened:
     """What each term moves that the parent's own numbers cannot take away."""
     behind = tuple(background(found) for found in parent.candidate.fits)
-    terms = _terms(behind, left_out)
+    terms = [(*own, *begun_as_before(own, known)) for own in _terms(behind, left_out)]
     ways = tuple(directions(b, own, jobs) for b, own in zip(behind, terms, strict=True))
     return Screened(parent, behind, _of_one_size(ways), known, left_out)
 
@@ -254,7 +252,7 @@ def _likely(
     behind: Background,
     ways: tuple[Directions, ...],
     references: tuple[Fit, ...],
-    known: Collection[str],
+    known: Known,
     jobs: int,
 ) -> list[Term]:
     """Terms of one recording that are worth a first fit."""
@@ -346,7 +344,7 @@ def first_of_each[T](ranked: Iterable[T], kind: Callable[[T], Hashable]) -> list
     return list(first.values())
 
 
-def _worth_a_fit(trials: list[tuple[float, Trial]], known: Collection[str]) -> list[Trial]:
+def _worth_a_fit(trials: list[tuple[float, Trial]], known: Known) -> list[Trial]:
     """The best after a first fit, what is nominal or known, and all at the place of the best."""
     ranked = [seen for _, seen in trials]
     chosen = ranked[:REFITTED]

@@ -9,7 +9,7 @@ parameters change. Explained one by one, two of them may well be given different
 misfit: they are searched as one, by the sum of the evidence, and fitted together.
 """
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
 
@@ -37,7 +37,7 @@ from endoscope_explain.search.left_out import LEAST_RECORDINGS
 from endoscope_explain.search.null_rigs import NO_DETECTABLE_GAIN, null_of_several, null_rigs
 from endoscope_explain.search.pairs import better_pair
 from endoscope_explain.search.refit import Candidate, by_fine_derivatives, candidate, converged
-from endoscope_explain.search.term import Term
+from endoscope_explain.search.term import Known, Term
 
 MOST_FITS, WORTH_A_FIT = 6, 1.0
 """Fits of what every rig has, without which all other numbers were bent, and the gain of evidence
@@ -152,7 +152,7 @@ def search(
     jobs: int,
     depth: int = MOST_EFFECTS,
     left_out: tuple[str, ...] = (),
-    known: Collection[str] = (),
+    known: Known | None = None,
     report: Callable[[str], None] = lambda _: None,
 ) -> JointSearch:
     """Search what is missing from a joint: `depth` terms at most beside nominal physics."""
@@ -171,7 +171,7 @@ def search(
     first: Screened | None = None  # of the last candidate that has only what every rig has
     while len(parents[0].candidate.terms) < depth and not parents[0].candidate.is_noise:
         changed = any(each.adds_nothing(each.best) for each in levels)
-        screens = [screen_terms(parent, jobs, left_out, known) for parent in parents]
+        screens = [screen_terms(parent, jobs, left_out, known or {}) for parent in parents]
         if all(term.is_in_every_rig for term in parents[0].candidate.terms):
             first = screens[0]
         level = _level(screens, first, jobs, other_numbers=not changed)

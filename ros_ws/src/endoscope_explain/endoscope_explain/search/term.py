@@ -30,6 +30,10 @@ from endoscope_explain.search.periods import likely_periods, period_bounds
 Variant = tuple[str, tuple[float, ...]]
 """A term, and what it acts on or which of its forms it has, which no shape of a tube changes."""
 
+Known = Mapping[str, Mapping[str, float]]
+"""Effects and places that other recordings of a rig gave or left open, each with the numbers that
+it had; none where only its name is known."""
+
 LAGS = 3
 """Time constants at which arguments that lag are tried."""
 
@@ -208,6 +212,16 @@ def starting_points(effect: Effect) -> list[dict[str, float]]:
     ]
     names = [p.name for p in effect.parameters]
     return [dict(zip(names, combination, strict=True)) for combination in product(*values)]
+
+
+def begun_as_before(terms: Iterable[Term], known: Known) -> Iterator[Term]:
+    """Effects that are known, each begun at the numbers that it had."""
+    for name, numbers in known.items():
+        own = [term for term in terms if term.id == name and not term.is_function]
+        start = dict(numbers)
+        same = [t for t in own if t.variant == replace(t, start={**t.start, **start}).variant]
+        if numbers and same:
+            yield replace(same[0], start={**same[0].start, **start})
 
 
 def mirrored(term: Term) -> Term | None:

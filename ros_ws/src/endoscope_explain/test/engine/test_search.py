@@ -22,7 +22,14 @@ from endoscope_explain.search.levels import Level, search
 from endoscope_explain.search.null_rigs import Null
 from endoscope_explain.search.refit import Candidate, candidate
 from endoscope_explain.search.screen import background, directions, gains, screened
-from endoscope_explain.search.term import LAGS, Term, effects, functions, starting_points
+from endoscope_explain.search.term import (
+    LAGS,
+    Term,
+    begun_as_before,
+    effects,
+    functions,
+    starting_points,
+)
 
 
 @pytest.fixture(scope='module')
@@ -100,6 +107,17 @@ def _family(found):
     return next(term.family for term in terms if term.id == 'load_of_angle')
 
 
+def test_what_is_known_begins_at_the_numbers_that_it_had(sound):
+    slow = {'moment_nm': 0.0005, 'frequency_hz': 0.0771, 'phase_rad': 0.3, 'second_harmonic': 0.0}
+    known = {'breathing': slow, 'load_cell_bias': {'bias_n': 0.2, 'wire': 1.0}, 'gravity': {}}
+    again = list(begun_as_before(effects(sound[0]), known))
+    assert [(term.id, dict(term.start)) for term in again] == [
+        ('breathing', slow),
+        ('load_cell_bias', {'bias_n': 0.2, 'wire': 1.0}),
+    ]
+    assert again[1].variant == ('load_cell_bias', (1.0,))
+
+
 def test_gains_by_linear_algebra_are_those_of_the_residuals_themselves(references):
     refitted, _ = references(effect('gravity', moment_nm=0.002))
     behind = background(refitted)
@@ -115,7 +133,7 @@ def test_gains_by_linear_algebra_are_those_of_the_residuals_themselves(reference
 
 def test_an_effect_is_found_by_its_formula_with_nothing_left(references):
     hidden = effect('joint_backlash', gap_rad=0.05)
-    tried = search([references(hidden)], 2, known=('cogging',))
+    tried = search([references(hidden)], 2, known={'cogging': {}})
     decision = decide(tried, 2)
     assert [term.name for term in decision.missing] == [hidden.id]
     fitted = {term.id for each in tried.tried() for term in each.terms}
