@@ -83,26 +83,34 @@ def open_questions(case: ExplainedCase) -> list[OpenQuestion]:
     """What is left open beside each effect of a case, and at joints where none, or no more, is."""
     explanation, found = case.explanation, []
     duration = case.recording.duration
-    for effect in case.effects:
-        if effect.contest is not None:
-            chances = _chances(effect.contest, effect.id)
-            found.append(OpenQuestion(effect.joint, chances, effect.contest, duration, effect))
-    for joint, contest in explanation.contests.items():
-        chances = _chances(contest, contest.nameless)
-        found.append(OpenQuestion(joint, chances, contest, duration))
+    contests: list[tuple[str, Contest | None, NamedEffect | None]] = [
+        *((effect.joint, effect.contest, effect) for effect in case.effects),
+        *((joint, contest, None) for joint, contest in explanation.contests.items()),
+    ]
+    for joint, contest, effect in contests:
+        if contest is None:
+            continue
+        named = contest.nameless if effect is None else effect.id
+        for chances in (_statements(contest, named), _names_of_one(contest, named)):
+            found.append(OpenQuestion(joint, chances, contest, duration, effect))
     return [each for each in found if len(each.chances) > 1]
 
 
-def _chances(contest: Contest, named: str) -> dict[str, float]:
-    """The set that is left open, by all names of each statement that can be simulated."""
-    # What is one statement in these recordings need not be one in another motion: its names share
-    # its probability.
+def _statements(contest: Contest, named: str) -> dict[str, float]:
+    """The set that is left open, each statement by the first of its names that can be simulated."""
     chances: dict[str, float] = {}
     for names, p in contest.left_open(named).items():
-        laws = [n for n in names if n in (named, OTHER_NUMBERS) or n in KNOWN] or names[:1]
-        for name in laws:
-            chances[name] = chances.get(name, 0.0) + max(p / len(laws), _LEAST)
+        name = named if named in names else next((n for n in names if n in KNOWN), names[0])
+        chances[name] = chances.get(name, 0.0) + max(p, _LEAST)
     return dict(sorted(chances.items(), key=lambda each: each[0] != named))
+
+
+def _names_of_one(contest: Contest, named: str) -> dict[str, float]:
+    """Names that are one statement with what was named so far, and that can be simulated."""
+    # Another motion may tell them apart. Until then none is likelier than another.
+    own = next((names for names in contest.left_open(named) if named in names), ())
+    laws = [named, *(n for n in own if n != named and (n in KNOWN or n == OTHER_NUMBERS))]
+    return dict.fromkeys(laws, 1.0 / len(laws))
 
 
 def fitted_laws(case: ExplainedCase, question: OpenQuestion) -> dict[str, PlantDescription]:

@@ -36,8 +36,11 @@ from endoscope_explain.recording import RigRecording, recording_from_bag, with_u
 Engine = Callable[..., Explanation]
 
 
-def read_inputs(sources: Sources) -> Inputs:
-    """Read and audit all recordings of a case; BagError, with its name, if one cannot be used."""
+def read_inputs(sources: Sources, setup: AuditReport | None = None) -> Inputs:
+    """Read and audit all recordings of a case; BagError, with its name, if one cannot be used.
+
+    `setup` is as for `audit_recording`, for the recording to explain.
+    """
 
     def read(path: Path, plant: PlantDescription) -> RigRecording:
         return recording_from_bag(
@@ -60,11 +63,13 @@ def read_inputs(sources: Sources) -> Inputs:
 
     baseline = second('baseline', sources.baseline)
     validation = second('second recording', sources.validate)
-    return Inputs(sources, _audited(raw, plant), baseline, validation, tuple(mistaken))
+    return Inputs(sources, _audited(raw, plant, setup), baseline, validation, tuple(mistaken))
 
 
-def _audited(raw: RigRecording, plant: PlantDescription) -> AuditReport:
-    report = audit_recording(raw, plant)
+def _audited(
+    raw: RigRecording, plant: PlantDescription, setup: AuditReport | None = None
+) -> AuditReport:
+    report = audit_recording(raw, plant, setup)
     return replace(report, recording=with_command_between_rows(report.recording, plant))
 
 

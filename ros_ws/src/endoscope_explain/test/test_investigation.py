@@ -73,10 +73,11 @@ class SimulatedRig:
 
     def explain(self, bags, known):
         """Explain the recordings of bags together, as `explain_together` does."""
+        first = audit_recording(self.recordings[bags[0]], ONE)
         inputs = [
             Inputs(
                 Sources(bag, ONE, quick=True, effects=1),
-                audit_recording(self.recordings[bag], ONE),
+                audit_recording(self.recordings[bag], ONE, first),
             )
             for bag in bags
         ]
@@ -269,7 +270,7 @@ def test_a_comparison_that_nobody_wants_leaves_what_is_known(both, certain):
 
 def test_what_is_at_its_end_is_not_begun_again(both, certain):
     assert investigate(both, no_rig, lambda bags, known: certain).stopped is Stop.ONE_CLASS
-    with pytest.raises(InputError, match='at its end: One class is left'):
+    with pytest.raises(InputError, match='at its end: One explanation is left'):
         begun(both.folder, both.plant_file)
 
 
@@ -331,6 +332,34 @@ def test_what_the_calibration_leaves_without_a_name_is_looked_at_in_the_commissi
     assert [each.motion for each in log.rounds] == ['calibration', 'commissioning']
     assert log.stopped is Stop.ONE_CLASS
     assert 'has no name' in log.words
+
+
+def test_what_no_short_motion_decides_is_looked_at_in_the_commissioning_motion(both, stribeck_case):
+    # Where the tip was never seen, nothing says how far a motion may go.
+    bending = stribeck_case.recording.bending
+    unseen = stribeck_case.recording.with_series(
+        {'bending': dataclasses.replace(bending, valid=np.zeros_like(bending.valid))}
+    )
+    audit = dataclasses.replace(stribeck_case.inputs.audit, recording=unseen)
+    inputs = dataclasses.replace(stribeck_case.inputs, audit=audit)
+    case = dataclasses.replace(stribeck_case, inputs=inputs)
+    both = dataclasses.replace(both, experiments=4)
+    log = investigate(both, no_rig, lambda bags, known: case)
+    assert [each.motion for each in log.rounds] == ['calibration', 'commissioning']
+    assert log.stopped is Stop.NOTHING_TO_GAIN
+    assert 'confounded with viscous_friction' in log.words
+
+
+def test_a_rig_whose_improved_plant_is_too_tight_is_not_commissioned(both, certain):
+    tight = dataclasses.replace(JointParameters(), pretension=100.0)
+    found = {'effects': (), 'verdict': Verdict.UNKNOWN_PHYSICS}
+    explanation = dataclasses.replace(certain.explanation, **found)
+    plant = PlantDescription(dict.fromkeys(JOINTS, tight))
+    unnamed = dataclasses.replace(certain, explanation=explanation, plant=plant, **found)
+    log = investigate(both, no_rig, lambda bags, known: unnamed)
+    assert [each.motion for each in log.rounds] == ['calibration']
+    assert log.stopped is Stop.NOTHING_TO_GAIN
+    assert 'But the commissioning motion is refused' in log.words
 
 
 @pytest.mark.parametrize('joint', [0, 1])

@@ -52,6 +52,19 @@ def test_a_command_in_degrees_is_known_by_the_reach_of_the_rig_where_only_the_ti
     np.testing.assert_allclose(audit.recording.command.values, sound.command.values)
 
 
+def test_units_are_those_of_another_recording_of_the_same_set_up(record):
+    time = np.arange(0.0, 4.0, 1e-3)
+    small = record(ONE_JOINT, command=(0.5 * np.sin(2.0 * time))[:, None])
+    wide = record(ONE_JOINT, duration=6.0)
+    known = audit_recording(in_degrees(wide), ONE_JOINT)
+    audit = audit_recording(in_degrees(small), ONE_JOINT, known)
+    np.testing.assert_allclose(audit.recording.bending.values, small.bending.values)
+    assert audit.mistakes()
+    # Nobody changes a unit between two motions.
+    audit = audit_recording(in_degrees(small), ONE_JOINT, audit_recording(wide, ONE_JOINT))
+    assert audit.mistakes() == ()
+
+
 def as_described(recording, plant, **_):
     """What is found where the plant is as described."""
     fit = fits_by(view(recording, {'nominal': plant}), 'nominal')

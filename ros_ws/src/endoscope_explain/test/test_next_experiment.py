@@ -231,10 +231,16 @@ def test_names_that_are_one_statement_in_the_recordings_are_told_apart_where_a_m
     alone = ('transport_delay', 'actuator_lag', 'load_of_angle')
     case = case_of(late, LATE, 'transport_delay', names=(alone,), gains=(4000.0,))
     (question,) = open_questions(case)
-    half = question.chances['transport_delay']
-    # A function at the place of a name that can be simulated is the same question.
-    assert question.chances == {'transport_delay': half, 'actuator_lag': half}
+    # A function cannot be simulated as it stands.
+    assert question.chances == {'transport_delay': 0.5, 'actuator_lag': 0.5}
     assert propose(case, what_is_asked(case)).separates == ('transport_delay', 'actuator_lag')
+    # Beside another statement they are a question of their own, and do not water that one down.
+    beside = case_of(
+        late, LATE, 'transport_delay', names=(alone, ('gravity',)), gains=(4000.0, 3999.9)
+    )
+    between, within = open_questions(beside)
+    assert between.chances.keys() == {'transport_delay', 'gravity'}
+    assert within.chances == question.chances
 
 
 def test_for_a_law_of_no_name_a_motion_is_asked_for_that_was_never_made(late_case):

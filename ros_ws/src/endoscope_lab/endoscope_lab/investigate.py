@@ -48,7 +48,7 @@ Array = NDArray[np.float64]
 
 TICK = 1e-3
 CALIBRATED, ASKED, COMMISSIONED = 'calibration', 'loop', 'one motion'
-"""What a rig is explained by: the loop's first motion, the whole loop, and one motion of 28 s that
+"""What a rig is explained by: the loop's first motion, the whole loop, and one motion of 29 s that
 is fixed beforehand."""
 UNDER_WAY = 'under way'
 ONE, TWO = 'one effect', 'two effects'
@@ -91,15 +91,19 @@ def run(args: argparse.Namespace) -> int:
         if seed not in done
     ]
     # A rig that was broken off is begun again.
-    rows = [row for row in before if row.seed in done]
+    begun: dict[int, list[Asked]] = {}
+    for row in before:
+        begun[row.seed] = [*(begun.get(row.seed, []) if row.by != CALIBRATED else []), row]
+    rows = [row for seed in done for row in begun[seed]]
     for call, future in side_by_side(args.jobs, asked, calls):
         error = future.exception()
         found = _failed(*call[:2], error, args.json) if error else future.result()
         rows += found
         for row in found:
             print(f'{row.by:12s}{row.experiments:2d} {row.line()}', flush=True)
-    print('\n' + table(rows))
-    print(f'\n{len({row.seed for row in rows})} of {len(args.seeds)} rigs')
+    whole = {row.seed for row in rows if row.by == COMMISSIONED}
+    print('\n' + table([row for row in rows if row.seed in whole]))
+    print(f'\n{len(whole)} of {len(args.seeds)} rigs')
     return 1 if any(row.verdict == 'FAILED' for row in rows) else 0
 
 
@@ -253,12 +257,11 @@ def explained(
     known: KnownOfRig = MappingProxyType({}),
 ) -> tuple[ExplainedCase, _Answer]:
     """Explain recordings of one rig together, on one core."""
+    first = audit_recording(recordings[0], plant)
+    audits = [first, *(audit_recording(one, plant, first) for one in recordings[1:])]
     inputs = [
-        Inputs(
-            Sources(Path(one.name), plant, quick=True, jobs=1, known=known),
-            audit_recording(one, plant),
-        )
-        for one in recordings
+        Inputs(Sources(Path(audit.recording.name), plant, quick=True, jobs=1, known=known), audit)
+        for audit in audits
     ]
     begun, begun_cpu = time.monotonic(), time.process_time()
     case = explain_case(inputs_joined(inputs))

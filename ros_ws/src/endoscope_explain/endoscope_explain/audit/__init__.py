@@ -40,11 +40,18 @@ STEPS = (
 """Each finds what is wrong and puts it right; it needs what those before it have put right."""
 
 
-def audit_recording(recording: RigRecording, plant: PlantDescription) -> AuditReport:
-    """Find what is wrong with a recording, and correct it to what it must mean where it can be."""
-    seen = Examined(recording, recording, plant.of_joints(recording.joints))
+def audit_recording(
+    recording: RigRecording, plant: PlantDescription, setup: AuditReport | None = None
+) -> AuditReport:
+    """Find what is wrong with a recording, and correct it to what it must mean where it can be.
+
+    With the audit of another recording of the same set-up, its units, signs and orders are those.
+    """
+    # A small motion in which play hides the tip fits wrong units better than right ones.
+    known = None if setup is None else setup.misreadings
+    seen = Examined(recording, recording, plant.of_joints(recording.joints), misreadings=known)
     for step in STEPS:
         seen = step.find(seen)
     order = (Severity.MISTAKE, Severity.FAULT, Severity.NOTE)
     findings = sorted(seen.findings, key=lambda f: order.index(f.severity))
-    return AuditReport(seen.recording, tuple(findings))
+    return AuditReport(seen.recording, tuple(findings), seen.misreadings or ())

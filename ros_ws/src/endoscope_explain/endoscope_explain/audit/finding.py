@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
 
+from endoscope_explain.audit.misreading import Misreading
 from endoscope_explain.explanation import Estimate
 from endoscope_explain.recording import DESIRED, RigRecording, motor_name, signal_name
 
@@ -101,6 +102,7 @@ class AuditReport:
     # As corrected, with strictly increasing stamps; samples that must not be judged are not valid.
     recording: RigRecording
     findings: tuple[Finding, ...]  # most serious first
+    misreadings: tuple[Misreading, ...] = ()  # that were corrected
 
     def faults(self) -> tuple[Finding, ...]:
         """Return the findings that change the verdict."""

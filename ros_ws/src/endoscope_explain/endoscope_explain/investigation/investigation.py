@@ -15,11 +15,12 @@ from endoscope_core.physics.plant_file import load_plant, save_plant
 from endoscope_core.rig import Rig
 from endoscope_core.signals.sampled_motion import write_command_file
 from endoscope_explain.case import ExplainedCase, Sources
-from endoscope_explain.design import is_wide, propose, what_is_asked
+from endoscope_explain.design import deciding, is_wide, narrowing, what_is_asked
 from endoscope_explain.explanation import NamedEffect, Verdict
 from endoscope_explain.investigation import log as logs
 from endoscope_explain.investigation.log import COMMISSIONING, Log, Name, RigAnswer, Round, Stop
 from endoscope_explain.investigation.motions import (
+    MotionRefusedError,
     PlayThrough,
     RigMotion,
     calibration,
@@ -74,9 +75,10 @@ def explain_together(
 ) -> ExplainedCase:
     """Explain bags of one rig as one recording; BagError if one cannot be used."""
     plant, file, jobs = investigation.plant, investigation.plant_file, investigation.jobs
-    first = Sources(bags[0], plant, quick=True, jobs=jobs, plant_file=file, known=known)
-    inputs = [read_inputs(replace(first, bag=bag)) for bag in bags]
-    return explain_case(inputs_joined(inputs), progress=progress)
+    sources = Sources(bags[0], plant, quick=True, jobs=jobs, plant_file=file, known=known)
+    first = read_inputs(sources)
+    others = [read_inputs(replace(sources, bag=bag), first.audit) for bag in bags[1:]]
+    return explain_case(inputs_joined([first, *others]), progress=progress)
 
 
 def investigate(
@@ -179,25 +181,34 @@ class _Running:
         self.report('looking for the motion that decides more')
         began = time.monotonic()
         asked = what_is_asked(case)
-        proposed = propose(case, asked, self.of.jobs, played)
-        motion: RigMotion | Stop = Stop.NOTHING_TO_GAIN
-        if proposed is not None:
-            motion = of_experiment(proposed)
-        elif undecided and not commissioned:
-            motion = commissioning(self.of.plant, self.of.rig)
+        decides = deciding(asked, self.of.jobs, played)
+        if decides is None and undecided and not commissioned:
+            motion = self.commissioned(case.plant)
         else:
-            self.would_decide = what_would_decide(asked, self.of.jobs)
+            proposed = decides or narrowing(case, self.of.jobs, played)
+            motion = None if proposed is None else of_experiment(proposed)
+        if motion is None:
+            self.would_decide += what_would_decide(asked, self.of.jobs)
         self.keep(self.log.with_whole(proposed_s=time.monotonic() - began))
-        return motion
+        return motion or Stop.NOTHING_TO_GAIN
+
+    def commissioned(self, improved: PlantDescription) -> RigMotion | None:
+        """The commissioning motion, as large as described and improved plant allow."""
+        try:
+            return commissioning(self.of.plant, self.of.rig, improved)
+        except MotionRefusedError as error:
+            self.would_decide = f'But {error}. '
+            return None
 
     def known(self) -> KnownOfRig:
         """What was given or left open so far, and the numbers of what was given last."""
         found: dict[str, dict[str, Mapping[str, float]]] = {
             joint: {key: {} for key in sorted(names)} for joint, names in self.log.known().items()
         }
-        if found:
-            for spec in load_plant(self.of.folder / logs.PLANT).effects:
-                found.setdefault(spec.joint, {})[spec.id] = spec.parameters
+        file = self.of.folder / logs.PLANT
+        for spec in load_plant(file).effects if file.exists() else ():
+            if spec.id in found.get(spec.joint, {}):
+                found[spec.joint][spec.id] = spec.parameters
         return found
 
     def follow(self, track: PlayThrough) -> None:
@@ -218,11 +229,9 @@ class _Running:
         count = len(self.log.whole)
         after = f'after {count} motions' if count > 1 else 'after one motion'
         unnamed = answer is not None and answer.verdict == Verdict.UNKNOWN_PHYSICS
-        alone = (
-            'what is missing has no name, and so no rival,' if unnamed else 'no name has a rival'
-        )
+        left += ' What is missing has no name.' if unnamed else ''
         return {
-            Stop.ONE_CLASS: f'{alone} {after}.',
+            Stop.ONE_CLASS: f'nothing is open {after} that another one could decide.{left}',
             Stop.NOTHING_TO_GAIN: f'no safe motion is expected to decide more {after}.{left}'
             f'{self.would_decide and " "}{self.would_decide}',
             Stop.USED_UP: f'no more than {self.of.experiments} experiments were wanted.{left}',

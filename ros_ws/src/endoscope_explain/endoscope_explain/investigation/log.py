@@ -34,7 +34,7 @@ CUT_SHORT = (Stop.INTERRUPTED, Stop.FAULT, Stop.FAILED)
 GOES_ON = (*CUT_SHORT, Stop.USED_UP)
 """After these an investigation may be continued."""
 STOP_WORDS = {
-    Stop.ONE_CLASS: 'One class is left',
+    Stop.ONE_CLASS: 'One explanation is left',
     Stop.NOTHING_TO_GAIN: 'Nothing more can be gained',
     Stop.USED_UP: 'The experiments are used up',
     Stop.INTERRUPTED: 'It was interrupted',
@@ -265,7 +265,7 @@ def answered(answer: RigAnswer) -> Sequence[str]:
     lines = [answer.sentence]
     for name in answer.names:
         others = ' or '.join(name.rivals)
-        clear = f'confounded with {others}' if others else 'distinguished from all others'
+        clear = f'confounded with {others}' if others else 'no other effect is left open'
         strength = f', {name.strength}' if name.strength else ''
         chances = f'; likely are {name.left_open}' if name.left_open else ''
         lines.append(f'{name.id} of {name.joint}{strength}: {clear}{chances}.')

@@ -74,16 +74,19 @@ def calibration(plant: PlantDescription, rig: Rig) -> RigMotion:
     """The sinusoid that every session plays, on all joints, as large as is allowed; see `_safe`."""
     sinusoid = calibration_sinusoid()
     why = 'Nothing is known of the rig yet but its description.'
-    return _safe(CALIBRATION, dict.fromkeys(JOINTS, sinusoid), why, plant, rig)
+    return _safe(CALIBRATION, dict.fromkeys(JOINTS, sinusoid), why, rig, plant)
 
 
-def commissioning(plant: PlantDescription, rig: Rig) -> RigMotion:
-    """The commissioning motion as large as is allowed; see `_safe`."""
-    why = 'No shorter motion decides what is left open, and this one makes all that a rig can make.'
-    return _safe(COMMISSIONING, all_that_a_rig_makes(), why, plant, rig)
+def commissioning(
+    plant: PlantDescription, rig: Rig, improved: PlantDescription | None = None
+) -> RigMotion:
+    """The commissioning motion as large as is allowed by both plants; see `_safe`."""
+    why = 'What is left open or has no name is looked at in wide strokes, a hold and steps.'
+    plants = (plant,) if improved is None else (plant, improved)
+    return _safe(COMMISSIONING, strokes_hold_and_steps(), why, rig, *plants)
 
 
-def all_that_a_rig_makes() -> dict[str, Signal]:
+def strokes_hold_and_steps() -> dict[str, Signal]:
     """Wide strokes, a chirp, the strokes again with hold and small loop, and steps, by joint."""
     # 28 s and a rest of 1 s, about half as long as `signals.commissioning_motion`. Its strokes of
     # 140 deg are 40 deg wider than the backlash of the worst class, and come again in its second
@@ -101,28 +104,28 @@ def all_that_a_rig_makes() -> dict[str, Signal]:
 
 
 def _safe(
-    name: str, motion: Mapping[str, Signal], why: str, plant: PlantDescription, rig: Rig
+    name: str, motion: Mapping[str, Signal], why: str, rig: Rig, *plants: PlantDescription
 ) -> RigMotion:
     """The motion by joint as large as is allowed; MotionRefusedError if it is at no size."""
+    here = tuple(joint for joint in JOINTS if joint in plants[0].joints)
     time = np.arange(0.0, max(signal.duration for signal in motion.values()) + SAMPLE_S, SAMPLE_S)
     whole = np.stack(
-        [
-            motion[joint](time)[0] if joint in plant.joints else np.zeros_like(time)
-            for joint in JOINTS
-        ],
+        [motion[joint](time)[0] if joint in here else np.zeros_like(time) for joint in JOINTS],
         axis=1,
     )
     whole *= min(1.0, rig.joints.reach / float(np.abs(whole).max()))
     ceiling = rig.tension.calibration_ceiling
-    here = tuple(joint for joint in JOINTS if joint in plant.joints)
     columns = [JOINTS.index(joint) for joint in here]
     for share in SHARES:
         ticks, angle = as_played(time, share * whole, rig)
-        answer = answer_to(plant.of_joints(here), name, ticks, angle[:, columns], rig)
-        if is_safe(answer, ceiling, math.inf):
+        answers = [
+            answer_to(plant.of_joints(here), name, ticks, angle[:, columns], rig)
+            for plant in plants
+        ]
+        if all(is_safe(answer, ceiling, math.inf) for answer in answers):
             return RigMotion(name, ' and '.join(here), why, CommandTable(JOINTS, ticks, angle))
     raise MotionRefusedError(
-        f'the {name} motion is refused: the described plant answers {SHARES[-1]:.0%} of it '
+        f'the {name} motion is refused: its plant answers {SHARES[-1]:.0%} of it '
         f'with more than {ceiling:g} N, tension.calibration_ceiling of rig.yaml'
     )
 
@@ -160,7 +163,7 @@ LEAD_S = 4.0
 where the same way has led them, whatever was before and whichever plant is inverted."""
 TRACKED_SHARE = 0.4
 """Of the largest angle of the calibration: what compensation adds to it, up to 50 deg, stays within
-what the rig has been through."""
+what the rig has been through where that was played in full."""
 
 PlayThrough = Callable[[RigMotion, Path, Path, Path], None]
 """Plays a motion, which a file holds, to a bag, through the inverse of the plant of another."""

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Hashable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
@@ -70,14 +70,14 @@ class Screened:
     parent: Parent
     behind: tuple[Background, ...]
     ways: tuple[tuple[Directions, ...], ...]
-    known: Known = field(default_factory=dict)
+    known: Known
     left_out: tuple[str, ...] = ()  # effects that are not searched for
 
 
 def screen_terms(parent: Parent, jobs: int, left_out: tuple[str, ...], known: Known) -> Screened:
     """What each term moves that the parent's own numbers cannot take away."""
     behind = tuple(background(found) for found in parent.candidate.fits)
-    terms = [(*own, *begun_as_before(own, known)) for own in _terms(behind, left_out)]
+    terms = [(*begun_as_before(own, known), *own) for own in _terms(behind, left_out)]
     ways = tuple(directions(b, own, jobs) for b, own in zip(behind, terms, strict=True))
     return Screened(parent, behind, _of_one_size(ways), known, left_out)
 
@@ -258,7 +258,9 @@ def _likely(
     """Terms of one recording that are worth a first fit."""
     likely = _best_screened(screened(behind, ways))
     there = {term.variant for term in likely}
-    likely += [w.term for w in ways if w.term.id in known and w.term.variant not in there]
+    again = [way.term for way in ways if way.term.id in known]
+    likely += first_of_each((t for t in again if t.variant in there), lambda t: t.variant)
+    likely += [term for term in again if term.variant not in there]
     for described in references[1:]:
         # What is missing has bent the fitted numbers, but not the described ones.
         unbent = background(described)

@@ -216,12 +216,10 @@ def starting_points(effect: Effect) -> list[dict[str, float]]:
 
 def begun_as_before(terms: Iterable[Term], known: Known) -> Iterator[Term]:
     """Effects that are known, each begun at the numbers that it had."""
+    first = {term.id: term for term in reversed(tuple(terms)) if not term.is_function}
     for name, numbers in known.items():
-        own = [term for term in terms if term.id == name and not term.is_function]
-        start = dict(numbers)
-        same = [t for t in own if t.variant == replace(t, start={**t.start, **start}).variant]
-        if numbers and same:
-            yield replace(same[0], start={**same[0].start, **start})
+        if numbers and name in first:
+            yield replace(first[name], start={**first[name].start, **numbers})
 
 
 def mirrored(term: Term) -> Term | None:

@@ -37,7 +37,7 @@ def two_missing(one_joint):
     behind = background(refitted)
     terms = tuple(Term(CATALOGUE[n], s) for n in NAMES for s in starting_points(CATALOGUE[n]))
     ways = directions(behind, terms, 1)
-    return Screened(Parent(nominal, ((refitted,),)), (behind,), (ways,))
+    return Screened(Parent(nominal, ((refitted,),)), (behind,), (ways,), {})
 
 
 def test_the_pair_that_is_missing_gains_most_together(two_missing):

@@ -29,8 +29,7 @@ EFFECT = Effect(
         Parameter('phase_rad', 'rad', -7.0, 7.0, 0.0, starts=(0.0, 1.6), phase=True),
         Parameter('second_harmonic', '-', -0.5, 0.5, 0.0),
     ),
-    # Of less than two periods nothing shows that it repeats.
-    traits=Traits(depends_on_time=True, families=('load_periodic', 'load_of_time')),
+    traits=Traits(depends_on_time=True, families=('load_periodic',)),
 )
 MOMENT, FREQUENCY, PHASE, SECOND = EFFECT.places
 

@@ -76,7 +76,7 @@ def find(seen: Examined) -> Examined:
         topics = {signal.partition(':')[0] for f in stood for signal in f.signals}
         still = [n for n, s in recording.measured().items() if s.topic in topics]
         comparison = Comparison(recording, seen.plant, still)
-    mistakes = comparison.judged()
+    mistakes = comparison.judged() if seen.misreadings is None else seen.misreadings
     before, after = comparison.shares(), comparison.shares(mistakes)
     # An exchange of motors is one for all that their messages hold.
     found: dict[object, Finding] = {}
@@ -90,7 +90,7 @@ def find(seen: Examined) -> Examined:
         words = _SINGULAR if len(unlike) == 1 else _PLURAL
         found[UNLIKE] = UNLIKE.found(recording, unlike, **words)
     meant = frozen.without(as_meant(recording, mistakes), stood)
-    return seen.found(*found.values(), recording=meant)
+    return seen.found(*found.values(), recording=meant, misreadings=tuple(mistakes))
 
 
 def _finding(
