@@ -6,7 +6,6 @@ import time
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import gumbel_r
 
 from endoscope_core.atomic_output import write_text
 from endoscope_core.monitoring import Part
@@ -26,6 +25,8 @@ from endoscope_lab.watch.changing_rig import KINDS, SEGMENT_S, Watched, watched
 _PER_HOUR = 0.1
 """False alarms per hour of motion for which the thresholds are derived, all parts together."""
 _HOURS = SEGMENT_S / 3600.0
+_TAIL = 0.2
+"""Share of the segments whose largest gains are in the tail that is fitted."""
 
 
 def run(args: argparse.Namespace) -> int:
@@ -65,21 +66,22 @@ def _in_turn(changes: Sequence[tuple[str, int]], nominal: Sequence[int]) -> list
 
 def derived(rows: Sequence[Watched]) -> str:
     """Source of the module of thresholds, from nominal motion."""
-    # The largest gain of a segment follows an extreme value distribution (Gumbel, Statistics of
-    # Extremes, 1958), fitted to the root of the gain, which is about normal. Each part has an equal
-    # share of the false alarms.
+    # A log-likelihood ratio has an exponential tail where nothing changes (Wilks, Ann. Math. Stat.
+    # 9, 1938), and what models leave scales it: beyond a high level the largest gains of segments
+    # are exponential (peaks over threshold: Coles, Statistical Modeling of Extreme Values, 2001).
+    # Each part has an equal share of the false alarms. Its threshold is that of a likelihood ratio
+    # at least (Ville, Etude critique de la notion de collectif, 1939).
     share = _PER_HOUR * _HOURS / len(Part)
-    quantile, lines = float(gumbel_r.isf(share)), []
+    count, lines = max(1, round(_TAIL * len(rows))), list[str]()
     for part in Part:
-        # By moments, since a part without any gain has no likelihood to fit; its threshold is that
-        # of a likelihood ratio (Ville, Etude critique de la notion de collectif, 1939).
-        roots = np.sqrt([row.largest[part] for row in rows])
-        scale = float(np.std(roots)) * math.sqrt(6.0) / math.pi
-        place = float(np.mean(roots)) - np.euler_gamma * scale
-        largest = max(row.largest[part] for row in rows)
+        gains = np.sort([row.largest[part] for row in rows])
+        level = float(gains[max(0, len(gains) - count - 1)])
+        scale = float(np.mean(gains[-count:])) - level
+        largest = float(gains[-1])
         # The largest gain, in which a heavier tail would show, must raise no alarm.
         least = max(largest, -math.log(share))
-        threshold = float(f'{max((place + scale * quantile) ** 2, least):.3g}')
+        reached = level + scale * math.log(count / len(rows) / share)
+        threshold = float(f'{max(reached, least):.3g}')
         lines.append(f"    '{part}': {threshold!r},  # largest seen: {largest:.3g}")
     first, last = rows[0].seed, rows[-1].seed
     return (
