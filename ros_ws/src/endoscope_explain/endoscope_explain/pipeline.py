@@ -36,10 +36,10 @@ from endoscope_explain.recording import RigRecording, recording_from_bag, with_u
 Engine = Callable[..., Explanation]
 
 
-def read_inputs(sources: Sources, setup: AuditReport | None = None) -> Inputs:
+def read_inputs(sources: Sources, before: AuditReport | None = None) -> Inputs:
     """Read and audit all recordings of a case; BagError, with its name, if one cannot be used.
 
-    `setup` is as for `audit_recording`, for the recording to explain.
+    `before` is as for `audit_recording`, for the recording to explain.
     """
 
     def read(path: Path, plant: PlantDescription) -> RigRecording:
@@ -63,13 +63,13 @@ def read_inputs(sources: Sources, setup: AuditReport | None = None) -> Inputs:
 
     baseline = second('baseline', sources.baseline)
     validation = second('second recording', sources.validate)
-    return Inputs(sources, _audited(raw, plant, setup), baseline, validation, tuple(mistaken))
+    return Inputs(sources, _audited(raw, plant, before), baseline, validation, tuple(mistaken))
 
 
 def _audited(
-    raw: RigRecording, plant: PlantDescription, setup: AuditReport | None = None
+    raw: RigRecording, plant: PlantDescription, before: AuditReport | None = None
 ) -> AuditReport:
-    report = audit_recording(raw, plant, setup)
+    report = audit_recording(raw, plant, before)
     return replace(report, recording=with_command_between_rows(report.recording, plant))
 
 

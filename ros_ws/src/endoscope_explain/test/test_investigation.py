@@ -73,14 +73,11 @@ class SimulatedRig:
 
     def explain(self, bags, known):
         """Explain the recordings of bags together, as `explain_together` does."""
-        first = audit_recording(self.recordings[bags[0]], ONE)
-        inputs = [
-            Inputs(
-                Sources(bag, ONE, quick=True, effects=1),
-                audit_recording(self.recordings[bag], ONE, first),
-            )
-            for bag in bags
-        ]
+        inputs = []
+        for bag in bags:
+            before = inputs[-1].audit if inputs else None
+            audit = audit_recording(self.recordings[bag], ONE, before)
+            inputs.append(Inputs(Sources(bag, ONE, quick=True, effects=1), audit))
         return explain_case(inputs_joined(inputs))
 
 

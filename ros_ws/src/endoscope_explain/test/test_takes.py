@@ -9,6 +9,7 @@ import pytest
 from endoscope_bags.errors import BagError
 from endoscope_core.physics.description import JointParameters, PlantDescription
 from endoscope_core.rig import shipped_rig
+from endoscope_explain.audit import audit_recording
 from endoscope_explain.audit.finding import AuditReport, Finding, Severity
 from endoscope_explain.case import Inputs, Sources
 from endoscope_explain.observe.observation import observe
@@ -60,6 +61,40 @@ def test_the_rig_itself_leaves_noise_of_both(takes):
     # Without what the first motion has left behind, the second one is another one.
     alone = fits_by(view(takes[1], {'rig': RIG}), 'rig')
     assert max(fit.ratio for fit in alone.values()) > 2.0
+
+
+@pytest.fixture(scope='module')
+def described():
+    """The rig as somebody describes it who is not right."""
+    numbers = JointParameters()
+    stiffer = dataclasses.replace(
+        numbers, joint_stiffness=1.1 * numbers.joint_stiffness, pretension=1.1 * numbers.pretension
+    )
+    return PlantDescription(dict.fromkeys(RIG.joints, stiffer))
+
+
+def test_the_second_motion_begins_where_the_first_has_left_the_rig(takes, described):
+    first = AuditReport(takes[0], ())
+    alone = audit_recording(takes[1], described)
+    after = audit_recording(takes[1], described, first)
+    assert 'earlier_motion' in {finding.id for finding in alone.findings}
+    assert 'earlier_motion' not in {finding.id for finding in after.findings}
+
+    def left(second):
+        joined = recordings_joined((takes[0], second.recording))
+        return max(fit.ratio for fit in fits_by(view(joined, {'rig': RIG}), 'rig').values())
+
+    # By a plant that is not right, the second one alone has a past that the rig has never had.
+    assert left(after) < 1.1 < 2.0 < left(alone)
+
+
+@pytest.mark.nightly
+def test_a_rig_that_was_moved_between_two_motions_is_taken_to_have_a_past(whole, takes, described):
+    first = AuditReport(takes[0], ())
+    begin = FIRST + REST + 2.0
+    later = part_of(whole, begin, begin + 3.0, 'later')
+    after = audit_recording(later, described, first)
+    assert 'earlier_motion' in {finding.id for finding in after.findings}
 
 
 def test_coarse_ticks_begin_where_a_recording_does(takes):

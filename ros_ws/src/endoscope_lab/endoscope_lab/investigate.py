@@ -257,8 +257,9 @@ def explained(
     known: KnownOfRig = MappingProxyType({}),
 ) -> tuple[ExplainedCase, _Answer]:
     """Explain recordings of one rig together, on one core."""
-    first = audit_recording(recordings[0], plant)
-    audits = [first, *(audit_recording(one, plant, first) for one in recordings[1:])]
+    audits = [audit_recording(recordings[0], plant)]
+    for one in recordings[1:]:
+        audits.append(audit_recording(one, plant, audits[-1]))
     inputs = [
         Inputs(Sources(Path(audit.recording.name), plant, quick=True, jobs=1, known=known), audit)
         for audit in audits

@@ -41,17 +41,16 @@ STEPS = (
 
 
 def audit_recording(
-    recording: RigRecording, plant: PlantDescription, setup: AuditReport | None = None
+    recording: RigRecording, plant: PlantDescription, before: AuditReport | None = None
 ) -> AuditReport:
     """Find what is wrong with a recording, and correct it to what it must mean where it can be.
 
-    With the audit of another recording of the same set-up, its units, signs and orders are those.
+    `before` is the audit of the recording of the same set-up before it: units, signs and orders are
+    the same, and it begins where that one ended unless its readings say that the rig was moved.
     """
-    # A small motion in which play hides the tip fits wrong units better than right ones.
-    known = None if setup is None else setup.misreadings
-    seen = Examined(recording, recording, plant.of_joints(recording.joints), misreadings=known)
+    seen = Examined(recording, recording, plant.of_joints(recording.joints), before=before)
     for step in STEPS:
         seen = step.find(seen)
     order = (Severity.MISTAKE, Severity.FAULT, Severity.NOTE)
     findings = sorted(seen.findings, key=lambda f: order.index(f.severity))
-    return AuditReport(seen.recording, tuple(findings), seen.misreadings or ())
+    return AuditReport(seen.recording, tuple(findings), seen.misreadings)

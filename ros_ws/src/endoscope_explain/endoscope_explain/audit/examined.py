@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from endoscope_core.physics.description import PlantDescription
-from endoscope_explain.audit.finding import Finding
+from endoscope_explain.audit.finding import AuditReport, Finding
 from endoscope_explain.audit.misreading import Misreading
 from endoscope_explain.audit.plausibility import Comparison
 from endoscope_explain.recording import Array, Mask, RigRecording, Series
@@ -22,7 +22,8 @@ class Examined:
     plant: PlantDescription  # of the recorded joints
     findings: tuple[Finding, ...] = ()
     comparison: Comparison | None = None  # with the plant, of what is long enough
-    misreadings: tuple[Misreading, ...] | None = None  # None where they are not known yet
+    misreadings: tuple[Misreading, ...] = ()  # that were corrected
+    before: AuditReport | None = None  # of the recording of the same set-up before it
 
     @property
     def noisy(self) -> bool:

@@ -76,9 +76,10 @@ def explain_together(
     """Explain bags of one rig as one recording; BagError if one cannot be used."""
     plant, file, jobs = investigation.plant, investigation.plant_file, investigation.jobs
     sources = Sources(bags[0], plant, quick=True, jobs=jobs, plant_file=file, known=known)
-    first = read_inputs(sources)
-    others = [read_inputs(replace(sources, bag=bag), first.audit) for bag in bags[1:]]
-    return explain_case(inputs_joined([first, *others]), progress=progress)
+    inputs = [read_inputs(sources)]
+    for bag in bags[1:]:
+        inputs.append(read_inputs(replace(sources, bag=bag), inputs[-1].audit))
+    return explain_case(inputs_joined(inputs), progress=progress)
 
 
 def investigate(

@@ -23,7 +23,13 @@ from endoscope_explain.audit.examined import Examined, without_times
 from endoscope_explain.audit.finding import FindingKind, Severity
 from endoscope_explain.observe.observation import ANALYSIS_PERIOD, JointObservation, observe
 from endoscope_explain.observe.predicted_signals import packed_rig
-from endoscope_explain.recording import LEAST_DURATION_S, MOVES_RAD, Array, Mask, RigRecording
+from endoscope_explain.recording import (
+    LEAST_DURATION_S,
+    MOVES_RAD,
+    Array,
+    Mask,
+    RigRecording,
+)
 
 NOT_JUDGED = FindingKind(
     'earlier_motion',
@@ -34,6 +40,11 @@ NOT_JUDGED = FindingKind(
 ESTIMATED = replace(
     NOT_JUDGED, remedy='the state at the start is estimated, and all is judged from it'
 )
+AT_REST_S = 0.1
+"""For which a rig is read at the end of one recording and at the beginning of the next."""
+AS_LEFT = 0.1
+"""Share of its range by which a tension may creep or drift between two recordings: a motion in
+between that comes back leaves it anywhere in its hysteresis, a third of the range and more."""
 MOST_REVERSALS = 5
 SHORTEST = 1e-6
 """Way back in rad, from where the motor stands, of the smallest reversals that are tried."""
@@ -50,6 +61,8 @@ def find(seen: Examined) -> Examined:
     """Estimate as its `start` from where the motors had come when a recording began."""
     # The time until it no longer shows by more than the noise is left out, if enough is left.
     recording = seen.recording
+    if seen.before is not None and _is_as_left(seen.before.recording, recording):
+        return seen
     observations = observe(recording, seen.plant)
     parameters, flags = packed_rig(observations, seen.plant)
     begin = float(recording.command.time[0])
@@ -83,6 +96,24 @@ def find(seen: Examined) -> Examined:
     return seen.found(
         *found, recording=without_times(recording, lambda t: t[:, None] < np.array(left_out))
     )
+
+
+def _is_as_left(before: RigRecording, recording: RigRecording) -> bool:
+    """Whether a rig reads at first what it read at the end of the recording before."""
+    # Tensions remember where the motors have been, and without them the tip does.
+    for name in ('tension', 'bending'):
+        last, first = before.measured().get(name), recording.measured().get(name)
+        if last is None or first is None:
+            continue
+        readings = np.where(last.valid, last.values, np.nan)
+        ended = readings[last.time >= last.time[-1] - AT_REST_S]
+        begun = np.where(first.valid, first.values, np.nan)[first.time <= first.time[0] + AT_REST_S]
+        if np.isnan(ended).all(axis=0).any() or np.isnan(begun).all(axis=0).any():
+            continue
+        moved = np.abs(np.nanmean(begun, axis=0) - np.nanmean(ended, axis=0))
+        span = np.nanmax(readings, axis=0) - np.nanmin(readings, axis=0)
+        return bool(np.all(moved <= AS_LEFT * span))
+    return True
 
 
 class _Past:

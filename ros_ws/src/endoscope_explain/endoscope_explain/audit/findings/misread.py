@@ -76,7 +76,8 @@ def find(seen: Examined) -> Examined:
         topics = {signal.partition(':')[0] for f in stood for signal in f.signals}
         still = [n for n, s in recording.measured().items() if s.topic in topics]
         comparison = Comparison(recording, seen.plant, still)
-    mistakes = comparison.judged() if seen.misreadings is None else seen.misreadings
+    # A small motion in which play hides the tip fits wrong units better than right ones.
+    mistakes = comparison.judged() if seen.before is None else seen.before.misreadings
     before, after = comparison.shares(), comparison.shares(mistakes)
     # An exchange of motors is one for all that their messages hold.
     found: dict[object, Finding] = {}
