@@ -86,7 +86,8 @@ class Restart:
     """Where another recording of the same rig begins within one that was made of several."""
 
     time: float  # of its first command, s
-    # (J, K), as `RigRecording.start`, the motors' way since the recording before.
+    # (J, K), as `RigRecording.start`, the motors' way since the recording before; none where the
+    # rig goes on as it was left.
     way: Array
     speed: Array  # (J,), as `RigRecording.start_speed`
 

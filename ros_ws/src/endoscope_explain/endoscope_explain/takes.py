@@ -80,7 +80,7 @@ def recordings_joined(recordings: Sequence[RigRecording]) -> RigRecording:
         restarts=tuple(
             Restart(
                 float(one.command.time[0]) + by,
-                one.command.values[0][:, None] if one.start is None else one.start,
+                np.empty((len(one.joints), 0)) if one.start is None else one.start,
                 np.zeros(len(one.joints)) if one.start_speed is None else one.start_speed,
             )
             for one, by in zip(recordings[1:], later[1:], strict=True)

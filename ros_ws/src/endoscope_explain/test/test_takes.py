@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from endoscope_bags.errors import BagError
-from endoscope_core.physics.description import JointParameters, PlantDescription
+from endoscope_core.physics.description import EffectSpec, JointParameters, PlantDescription
 from endoscope_core.rig import shipped_rig
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.audit.finding import AuditReport, Finding, Severity
@@ -86,6 +86,18 @@ def test_the_second_motion_begins_where_the_first_has_left_the_rig(takes, descri
 
     # By a plant that is not right, the second one alone has a past that the rig has never had.
     assert left(after) < 1.1 < 2.0 < left(alone)
+
+
+def test_what_presses_on_a_rig_goes_on_pressing(record):
+    loaded = dataclasses.replace(
+        RIG, effects=(EffectSpec('external_load', 'bend_x', {'moment_nm': 0.001, 'time_s': 1.0}),)
+    )
+    command = shaft()
+    whole = record(loaded, len(command) * 1e-3, 3, command)
+    begin = FIRST + REST
+    parts = part_of(whole, 0.0, FIRST, 'one'), part_of(whole, begin, begin + SECOND, 'two')
+    fits = fits_by(view(recordings_joined(parts), {'rig': loaded}), 'rig')
+    assert max(fit.ratio for fit in fits.values()) < 1.1
 
 
 @pytest.mark.nightly
