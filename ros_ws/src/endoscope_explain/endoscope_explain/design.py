@@ -69,7 +69,16 @@ def propose(
 ) -> NextExperiment | None:
     """The motion that decides most per second of what is asked about a case, if any does."""
     # Where nothing but a strength is open, it is the motion that narrows its interval.
-    return deciding(asked, jobs, played) or narrowing(case, jobs, played)
+    decides = deciding(asked, jobs, played)
+    if decides is not None:
+        return decides
+    there = {(spec.id, spec.joint) for spec in case.explanation.augmented.effects}
+    for effect in filter(is_wide, case.effects):
+        if (effect.id, effect.joint) in there:
+            found = narrow(case, effect, jobs, played)
+            if found is not None:
+                return found
+    return None
 
 
 def deciding(
@@ -78,17 +87,6 @@ def deciding(
     """The motion that decides most per second between names, if any does."""
     found = [best for each in asked if (best := each.best(jobs, played)) is not None]
     return max(found, key=lambda each: each.per_second).experiment() if found else None
-
-
-def narrowing(case: ExplainedCase, jobs: int = 1, played: Played = ()) -> NextExperiment | None:
-    """The motion that narrows the first wide interval of a strength that one narrows."""
-    there = {(spec.id, spec.joint) for spec in case.explanation.augmented.effects}
-    for effect in filter(is_wide, case.effects):
-        if (effect.id, effect.joint) in there:
-            found = narrow(case, effect, jobs, played)
-            if found is not None:
-                return found
-    return None
 
 
 @dataclass(frozen=True)

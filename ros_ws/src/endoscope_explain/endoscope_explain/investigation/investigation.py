@@ -15,7 +15,7 @@ from endoscope_core.physics.plant_file import load_plant, save_plant
 from endoscope_core.rig import Rig
 from endoscope_core.signals.sampled_motion import write_command_file
 from endoscope_explain.case import ExplainedCase, Sources
-from endoscope_explain.design import deciding, is_wide, narrowing, what_is_asked
+from endoscope_explain.design import deciding, is_wide, what_is_asked
 from endoscope_explain.explanation import NamedEffect, Verdict
 from endoscope_explain.investigation import log as logs
 from endoscope_explain.investigation.log import COMMISSIONING, Log, Name, RigAnswer, Round, Stop
@@ -174,8 +174,7 @@ class _Running:
         played = {(each.motion, each.joint) for each in whole}
         commissioned = any(motion == COMMISSIONING for motion, _ in played)
         unnamed = case.verdict == Verdict.UNKNOWN_PHYSICS and not commissioned
-        undecided = unnamed or bool(open_questions(case))
-        if not (undecided or any(map(is_wide, case.effects))):
+        if not (unnamed or open_questions(case)):
             return Stop.ONE_CLASS
         if len(whole) > self.of.experiments:
             return Stop.USED_UP
@@ -183,11 +182,9 @@ class _Running:
         began = time.monotonic()
         asked = what_is_asked(case)
         decides = deciding(asked, self.of.jobs, played)
-        if decides is None and undecided and not commissioned:
+        motion = None if decides is None else of_experiment(decides)
+        if motion is None and not commissioned:
             motion = self.commissioned(case.plant)
-        else:
-            proposed = decides or narrowing(case, self.of.jobs, played)
-            motion = None if proposed is None else of_experiment(proposed)
         if motion is None:
             self.would_decide += what_would_decide(asked, self.of.jobs)
         self.keep(self.log.with_whole(proposed_s=time.monotonic() - began))
