@@ -64,18 +64,16 @@ def what_is_asked(case: ExplainedCase) -> list['Asking']:
     return [Asking.of(case, question) for question in open_questions(case)]
 
 
-def propose(
-    case: ExplainedCase, asked: Sequence['Asking'], jobs: int = 1, played: Played = ()
-) -> NextExperiment | None:
+def propose(case: ExplainedCase, asked: Sequence['Asking'], jobs: int = 1) -> NextExperiment | None:
     """The motion that decides most per second of what is asked about a case, if any does."""
     # Where nothing but a strength is open, it is the motion that narrows its interval.
-    decides = deciding(asked, jobs, played)
+    decides = deciding(asked, jobs)
     if decides is not None:
         return decides
     there = {(spec.id, spec.joint) for spec in case.explanation.augmented.effects}
     for effect in filter(is_wide, case.effects):
         if (effect.id, effect.joint) in there:
-            found = narrow(case, effect, jobs, played)
+            found = narrow(case, effect, jobs)
             if found is not None:
                 return found
     return None
@@ -353,9 +351,7 @@ def is_wide(effect: NamedEffect) -> bool:
     return first is not None and 0.5 * (first.high - first.low) > WIDE * abs(first.value)
 
 
-def narrow(
-    case: ExplainedCase, effect: NamedEffect, jobs: int = 1, played: Played = ()
-) -> NextExperiment | None:
+def narrow(case: ExplainedCase, effect: NamedEffect, jobs: int = 1) -> NextExperiment | None:
     """The safe motion that halves the interval of a strength soonest; None where none does."""
     # The precision is what the recordings and the motion have of it together, by white noise (Box,
     # Lucas, Biometrika 46, 1959).
@@ -376,7 +372,7 @@ def narrow(
         slopes = law.slopes(answers[effect.id])
         return deviation(law.precision + slopes.T @ slopes) / deviation(law.precision), segment
 
-    motions = alone.not_played(effect.joint, played)
+    motions = alone.not_played(effect.joint, ())
     halving = [each for each in parallel_map(left, motions, jobs) if each[0] <= HALVED]
     if not halving:
         return None

@@ -90,7 +90,7 @@ def library(joint: str, reaches: tuple[tuple[str, float], ...], rig: Rig) -> tup
 
 
 def _signals(reach: float) -> Iterator[Signal]:
-    """Motions between -+`reach` rad, by name; they last 3 to 10 s."""
+    """Motions between -+`reach` rad, by name; they last 2 to 10 s."""
     yield _stroke('stroke', reach, 4.0)
     yield _stroke('quick stroke', reach, 2.0)
     yield _stroke('slow stroke', reach, 8.0)

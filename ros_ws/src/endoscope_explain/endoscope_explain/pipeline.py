@@ -48,6 +48,9 @@ def read_inputs(sources: Sources, before: AuditReport | None = None) -> Inputs:
         )
 
     raw = read(sources.bag, sources.plant)
+    if before is not None:
+        seen = before.recording
+        refuse_other_joints(sources.bag, raw.joints, Path(seen.name), seen.joints)
     plant = sources.plant.of_joints(raw.joints)
     mistaken: list[str] = []
 

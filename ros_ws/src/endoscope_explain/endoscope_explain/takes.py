@@ -27,7 +27,7 @@ from endoscope_explain.fit.nominal import ReferenceFits, with_references
 from endoscope_explain.fit.pooled import judged_alone
 from endoscope_explain.observe.observation import observe, with_held_noise
 from endoscope_explain.pipeline import read_inputs, refuse_other_joints
-from endoscope_explain.recording import Restart, RigRecording, Series
+from endoscope_explain.recording import MOVES_RAD, Array, Restart, RigRecording, Series
 from endoscope_explain.search.levels import search
 
 APART_S = 1.0
@@ -80,13 +80,20 @@ def recordings_joined(recordings: Sequence[RigRecording]) -> RigRecording:
         restarts=tuple(
             Restart(
                 float(one.command.time[0]) + by,
-                np.empty((len(one.joints), 0)) if one.start is None else one.start,
+                _way_between(before, one) if one.start is None else one.start,
                 np.zeros(len(one.joints)) if one.start_speed is None else one.start_speed,
             )
-            for one, by in zip(recordings[1:], later[1:], strict=True)
+            for before, one, by in zip(recordings[:-1], recordings[1:], later[1:], strict=True)
         ),
         **series,
     )
+
+
+def _way_between(before: RigRecording, one: RigRecording) -> Array:
+    """The motors' way (J, K) from the end of one recording to the next: none where they stood."""
+    first = one.command.values[0]
+    stood = bool(np.all(np.abs(first - before.command.values[-1]) < MOVES_RAD))
+    return np.empty((len(first), 0)) if stood else first[:, None]
 
 
 def _later_by(recordings: Sequence[RigRecording]) -> list[float]:

@@ -59,7 +59,11 @@ def test_units_are_those_of_another_recording_of_the_same_set_up(record):
     known = audit_recording(in_degrees(wide), ONE_JOINT)
     audit = audit_recording(in_degrees(small), ONE_JOINT, known)
     np.testing.assert_allclose(audit.recording.bending.values, small.bending.values)
-    assert audit.mistakes()
+    assert audit.misreadings == known.misreadings
+    # And of what a recording does not have nothing is corrected.
+    without = replace(small, tension=None)
+    in_mn = wide.with_series({'tension': replace(wide.tension, values=1e3 * wide.tension.values)})
+    assert audit_recording(without, ONE_JOINT, audit_recording(in_mn, ONE_JOINT)).mistakes() == ()
     # Nobody changes a unit between two motions.
     audit = audit_recording(in_degrees(small), ONE_JOINT, audit_recording(wide, ONE_JOINT))
     assert audit.mistakes() == ()

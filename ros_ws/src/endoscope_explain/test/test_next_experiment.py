@@ -9,7 +9,7 @@ from endoscope_core.rig import shipped_rig
 from endoscope_explain import design, operator_changes
 from endoscope_explain.audit import audit_recording
 from endoscope_explain.case import ExplainedCase, Inputs, Sources
-from endoscope_explain.design import Asking, propose, what_is_asked
+from endoscope_explain.design import Asking, deciding, propose, what_is_asked
 from endoscope_explain.experiment_motions import answer_to, is_safe, library
 from endoscope_explain.explanation import Explanation, NamedEffect, Verdict
 from endoscope_explain.observe.observation import commanded
@@ -184,7 +184,7 @@ def test_no_motion_decides_more_per_second_than_the_proposed_one(late_case, aski
 
 def test_what_was_played_is_not_proposed_again(late_case, asking):
     first = propose(late_case, [asking])
-    again = propose(late_case, [asking], played={(first.waveform, first.joint)})
+    again = deciding([asking], played={(first.waveform, first.joint)})
     assert again.waveform != first.waveform
 
 

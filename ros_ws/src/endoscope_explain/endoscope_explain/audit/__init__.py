@@ -18,6 +18,7 @@ from endoscope_explain.audit.findings import (
     stamp_unit,
     stray_poses,
 )
+from endoscope_explain.audit.plausibility import as_meant
 from endoscope_explain.recording import RigRecording
 
 __all__ = ['AuditReport', 'Finding', 'Severity', 'audit_recording']
@@ -48,7 +49,11 @@ def audit_recording(
     `before` is the audit of the recording of the same set-up before it: units, signs and orders are
     the same, and it begins where that one ended unless its readings say that the rig was moved.
     """
-    seen = Examined(recording, recording, plant.of_joints(recording.joints), before=before)
+    own = plant.of_joints(recording.joints)
+    known = () if before is None else before.misreadings
+    there = {'command', *recording.measured()}
+    meant = as_meant(recording, [each for each in known if each.quantity in there])
+    seen = Examined(meant, meant, own, misreadings=known, before=before)
     for step in STEPS:
         seen = step.find(seen)
     order = (Severity.MISTAKE, Severity.FAULT, Severity.NOTE)

@@ -229,7 +229,7 @@ class _Running:
         unnamed = answer is not None and answer.verdict == Verdict.UNKNOWN_PHYSICS
         left += ' What is missing has no name.' if unnamed else ''
         return {
-            Stop.ONE_CLASS: f'nothing is open {after} that another one could decide.{left}',
+            Stop.ONE_CLASS: f'no other name is left open {after}.{left}',
             Stop.NOTHING_TO_GAIN: f'no safe motion is expected to decide more {after}.{left}'
             f'{self.would_decide and " "}{self.would_decide}',
             Stop.USED_UP: f'no more than {self.of.experiments} experiments were wanted.{left}',

@@ -78,8 +78,9 @@ def derived(rows: Sequence[Watched]) -> str:
         level = float(gains[max(0, len(gains) - count - 1)])
         scale = float(np.mean(gains[-count:])) - level
         largest = float(gains[-1])
-        # The largest gain, in which a heavier tail would show, must raise no alarm.
-        least = max(largest, -math.log(share))
+        # The largest gain, in which a heavier tail would show, must raise no alarm: a hundredth
+        # above it, so that rounding does not come down to it.
+        least = max(1.01 * largest, -math.log(share))
         reached = level + scale * math.log(count / len(rows) / share)
         threshold = float(f'{max(reached, least):.3g}')
         lines.append(f"    '{part}': {threshold!r},  # largest seen: {largest:.3g}")

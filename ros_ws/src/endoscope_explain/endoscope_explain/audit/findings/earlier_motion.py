@@ -105,15 +105,15 @@ def _is_as_left(before: RigRecording, recording: RigRecording) -> bool:
         last, first = before.measured().get(name), recording.measured().get(name)
         if last is None or first is None:
             continue
-        readings = np.where(last.valid, last.values, np.nan)
-        ended = readings[last.time >= last.time[-1] - AT_REST_S]
-        begun = np.where(first.valid, first.values, np.nan)[first.time <= first.time[0] + AT_REST_S]
-        if np.isnan(ended).all(axis=0).any() or np.isnan(begun).all(axis=0).any():
-            continue
-        moved = np.abs(np.nanmean(begun, axis=0) - np.nanmean(ended, axis=0))
-        span = np.nanmax(readings, axis=0) - np.nanmin(readings, axis=0)
-        return bool(np.all(moved <= AS_LEFT * span))
-    return True
+        # Columns of which nothing is seen at either moment are masked.
+        was, now = (np.ma.array(s.values, mask=~s.valid) for s in (last, first))
+        ended = was[last.time >= last.time[-1] - AT_REST_S].mean(axis=0)
+        moved = np.ma.abs(now[first.time <= first.time[0] + AT_REST_S].mean(axis=0) - ended)
+        if moved.count():
+            # A joint that stood still is allowed as much as the one that moved.
+            span = max(float(np.ma.ptp(readings, axis=0).max()) for readings in (was, now))
+            return bool((moved <= AS_LEFT * span).all())
+    return False
 
 
 class _Past:

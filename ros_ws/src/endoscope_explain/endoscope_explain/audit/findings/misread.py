@@ -76,8 +76,9 @@ def find(seen: Examined) -> Examined:
         topics = {signal.partition(':')[0] for f in stood for signal in f.signals}
         still = [n for n, s in recording.measured().items() if s.topic in topics]
         comparison = Comparison(recording, seen.plant, still)
-    # A small motion in which play hides the tip fits wrong units better than right ones.
-    mistakes = comparison.judged() if seen.before is None else seen.before.misreadings
+    # A small motion in which play hides the tip fits wrong units better than right ones: what an
+    # earlier recording showed of the set-up is corrected already.
+    mistakes = comparison.judged() if seen.before is None else ()
     before, after = comparison.shares(), comparison.shares(mistakes)
     # An exchange of motors is one for all that their messages hold.
     found: dict[object, Finding] = {}
@@ -91,7 +92,8 @@ def find(seen: Examined) -> Examined:
         words = _SINGULAR if len(unlike) == 1 else _PLURAL
         found[UNLIKE] = UNLIKE.found(recording, unlike, **words)
     meant = frozen.without(as_meant(recording, mistakes), stood)
-    return seen.found(*found.values(), recording=meant, misreadings=tuple(mistakes))
+    known = (*seen.misreadings, *mistakes)
+    return seen.found(*found.values(), recording=meant, misreadings=known)
 
 
 def _finding(
