@@ -181,7 +181,7 @@ class LawsOfJoint:
         """What the rig has been through; see `_limits`."""
         return _limits(self.recording)
 
-    def not_played(self, joint: str, played: Played) -> list[Segment]:
+    def not_played(self, joint: str, played: Played = ()) -> list[Segment]:
         """Motions of a joint that were not played yet; none where no limits are known."""
         if self.limits is None:
             return []
@@ -372,7 +372,7 @@ def narrow(case: ExplainedCase, effect: NamedEffect, jobs: int = 1) -> NextExper
         slopes = law.slopes(answers[effect.id])
         return deviation(law.precision + slopes.T @ slopes) / deviation(law.precision), segment
 
-    motions = alone.not_played(effect.joint, ())
+    motions = alone.not_played(effect.joint)
     halving = [each for each in parallel_map(left, motions, jobs) if each[0] <= HALVED]
     if not halving:
         return None

@@ -27,9 +27,9 @@ def add_parser(subparsers: argparse._SubParsersAction) -> None:
         'investigate',
         help='move a rig, explain it, and play motions that discriminate between the alternatives',
         description='Plays the calibration sinusoid on a running graph and explains the recording '
-        'with the plant P.yaml. As long as an effect has alternatives, '
-        'plays the safe motion that discriminates best, and explains all recordings '
-        'together; where no short one does, the commissioning motion. Writes bags, log.json, '
+        'with the plant P.yaml. As long as an effect has alternatives, plays the safe motion that '
+        'discriminates best, and explains all recordings together; where no short one does, the '
+        'commissioning motion. Writes bags, log.json, '
         'log.md, index.html and the improved plant, plant.yaml, to DIR meanwhile. The same command '
         'on the same DIR continues an interrupted investigation. Each motion needs consent, has '
         'its own motion session, and is refused beyond the limits of rig.yaml. Ctrl-C pauses the '

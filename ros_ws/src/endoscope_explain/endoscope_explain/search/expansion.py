@@ -258,6 +258,7 @@ def _likely(
     """Terms of one recording that are worth a first fit."""
     likely = _best_screened(screened(behind, ways))
     there = {term.variant for term in likely}
+    # The first of its starts is the one at the numbers that it had.
     again = [way.term for way in ways if way.term.id in known]
     likely += first_of_each((t for t in again if t.variant in there), lambda t: t.variant)
     likely += [term for term in again if term.variant not in there]

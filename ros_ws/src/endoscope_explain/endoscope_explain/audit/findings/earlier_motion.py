@@ -23,13 +23,7 @@ from endoscope_explain.audit.examined import Examined, without_times
 from endoscope_explain.audit.finding import FindingKind, Severity
 from endoscope_explain.observe.observation import ANALYSIS_PERIOD, JointObservation, observe
 from endoscope_explain.observe.predicted_signals import packed_rig
-from endoscope_explain.recording import (
-    LEAST_DURATION_S,
-    MOVES_RAD,
-    Array,
-    Mask,
-    RigRecording,
-)
+from endoscope_explain.recording import LEAST_DURATION_S, MOVES_RAD, Array, Mask, RigRecording
 
 NOT_JUDGED = FindingKind(
     'earlier_motion',
